@@ -213,8 +213,9 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
 fn a_robots_senses_fail_on_px4() {
     let px4 = px4().expect("PAINTCOPTER_PX4");
     let number = |name: &str, usual: u64| std::env::var(name).map_or(usual, |text| text.parse().unwrap());
-    let first = number("SEED", 1);
-    for seed in first..first + number("FLIGHTS", 20) {
+    let (first, count) = (number("SEED", 1), number("FLIGHTS", 20));
+    let mut unknown = 0;
+    for seed in first..first + count {
         let mut random = random(seed);
         // The first numbers of near seeds are near each other.
         (0..8).for_each(|_| _ = random());
@@ -229,6 +230,12 @@ fn a_robots_senses_fail_on_px4() {
         let mut more = vec!["--seconds", "14"];
         more.extend(faults.iter().flat_map(|fault| ["--fault", fault]));
         let output = fly_small_rock(&s, &px4, seed, &more);
+        // Before a rock that is too smooth to tell where it is, it stays on the ground.
+        if text(&output).contains("it does not take off") {
+            println!("seed {seed}: not found in the map");
+            unknown += 1;
+            continue;
+        }
         let [late, holds, most, sprayed] =
             ["valve_open_late_count", "holds", "hit_error_max_m", "painted_s"].map(|name| figure(&s, "out", name));
         println!(
@@ -237,6 +244,7 @@ fn a_robots_senses_fail_on_px4() {
         );
         assert!(output.status.success() && late == 0.0 && most < 0.025, "{}", text(&output));
     }
+    assert!(2 * unknown < count, "{unknown} of {count} not found");
 }
 
 /// Random faults, in flights of the built-in wall of seeds 1 to 25; twenty minutes:

@@ -10,10 +10,12 @@ use super::phase::{Phase, Request, Situation};
 const SETTLE: f64 = 4.0;
 /// The plan goes on this much before the place where the paint ended, s.
 const RUN_UP: f64 = 1.5;
-/// It rises by this much at least, m.
-const TAKE_OFF: f64 = 0.3;
-/// Ways to and from a station that is higher than the plan begin and end so much above it, m: they are straight.
+/// A station is crossed by this much at least, m.
+const LEAST_CLEARANCE: f64 = 0.3;
+/// Ways to and from a station that is higher than the plan, or hardly lower, begin and end so much above it, m: they are straight.
 const CLEARANCE: f64 = 1.0;
+/// So near its station, across and in height, the robot has not risen yet, or stands on it again, m.
+const STANDS: [f64; 2] = [0.5, 0.1];
 /// Rest after take-off and above the place of the start, s.
 const REST: f64 = 1.0;
 /// So near its end a way is flown, m; later than this it is given up, s.
@@ -154,12 +156,7 @@ impl<P: FlightPlan + Copy> Phases<P> {
         match self.phase {
             Phase::Wait if !ready => self.good_since = None,
             Phase::Wait if good_for >= ESTIMATE_AGE => self.enter(now, Phase::Arm, None),
-            Phase::Arm if cause.is_none() => {
-                let above = over(&station, self.plan.at(self.resume()).position.z);
-                let above = Point3::new(above.x, above.y, above.z.max(station.z + TAKE_OFF));
-                let way = Guidance::way(station, station_heading, above, station_heading, now);
-                self.enter(now, Phase::TakeOff, Some(way));
-            }
+            Phase::Arm if cause.is_none() => self.take_off(now, station, station_heading),
             Phase::TakeOff if self.arrived(situation, REST) => self.approach(situation),
             Phase::Approach if self.arrived(situation, SETTLE) => {
                 self.enter(now, Phase::Paint, Some(Guidance::Plan { offset: now - self.resume() }));
@@ -171,7 +168,11 @@ impl<P: FlightPlan + Copy> Phases<P> {
                     self.go_home(situation);
                 }
             }
-            Phase::Hold(_) if good_for >= RECOVERED => self.approach(situation),
+            Phase::Hold(_) if good_for < RECOVERED => {}
+            Phase::Hold(_) if stands(&(position - station)) => {
+                self.take_off(now, Point3::new(position.x, position.y, station.z), heading);
+            }
+            Phase::Hold(_) => self.approach(situation),
             Phase::Return if self.arrived(situation, REST) => self.enter(now, Phase::Land, None),
             Phase::Land if !armed => self.enter(now, Phase::Done, None),
             _ => {}
@@ -254,6 +255,12 @@ impl<P: FlightPlan + Copy> Phases<P> {
         (self.painted - RUN_UP).max(0.0)
     }
 
+    /// Straight up from a station.
+    fn take_off(&mut self, now: f64, station: Point3<f64>, heading: f64) {
+        let above = over(&station, self.plan.at(self.resume()).position.z);
+        self.enter(now, Phase::TakeOff, Some(Guidance::way(station, heading, above, heading, now)));
+    }
+
     fn approach(&mut self, situation: &Situation) {
         let Situation { now, position, heading, .. } = *situation;
         let start = self.plan.at(self.resume());
@@ -270,10 +277,16 @@ impl<P: FlightPlan + Copy> Phases<P> {
     }
 }
 
-/// Over a station at a height, or above it where it is higher.
+/// Over a station at a height, or above it where it is higher, or in the way.
 fn over(station: &Point3<f64>, height: f64) -> Point3<f64> {
-    let height = if height < station.z { station.z + CLEARANCE } else { height };
+    let height = if height < station.z + LEAST_CLEARANCE { station.z + CLEARANCE } else { height };
     Point3::new(station.x, station.y, height)
+}
+
+/// Whether a robot so far from its station is still, or again, on it.
+fn stands(off: &Vector3<f64>) -> bool {
+    let [across, in_height] = STANDS;
+    off.xy().norm() < across && off.z.abs() < in_height
 }
 
 #[cfg(test)]
@@ -342,30 +355,47 @@ mod tests {
             phases.advance(&Situation { now, cause: None, position, heading: 0.0, ready: true, armed: true });
         }
         let names: Vec<_> = phases.events().iter().map(|(_, phase)| *phase).collect();
-        let [hold, again] = [Phase::Hold(Cause::NotFollowed), Phase::Approach];
+        let [hold, again] = [Phase::Hold(Cause::NotFollowed), Phase::TakeOff];
         let given_up = Phase::Aborted(Cause::NotFollowed);
         assert_eq!(names, [Phase::Arm, Phase::TakeOff, hold, again, hold, again, given_up]);
     }
 
-    /// A stand of 3.5 m, a plan at 2 m: whatever lies within 30 cm of the stand's middle is crossed above it.
+    /// Stands around a plan at 2 m: whatever lies within 30 cm of their middle is crossed well above them.
     #[test]
-    fn a_station_above_the_plan_is_left_and_reached_from_above() {
-        let stand = Point3::new(0.0, 0.0, 3.5);
-        let (mut phases, mut clock, mut lowest) = (Phases::new(Line, 20.0, 0.0), 0.0, f64::INFINITY);
-        while phases.phase() != Phase::Land {
-            clock += 0.1;
-            assert!(clock < 100.0, "stays in {}", phases.phase());
-            let position = phases.guided().map_or(stand, |guided| guided.at(clock).position);
-            let leaves = matches!(phases.phase(), Phase::Approach | Phase::Return);
-            if leaves && (position - stand).xy().norm() < 0.3 {
-                lowest = lowest.min(position.z - stand.z);
+    fn a_station_as_high_as_the_plan_is_left_and_reached_from_above() {
+        for height in [3.5, 2.01, 2.0, 1.99, 1.8, 1.6] {
+            let stand = Point3::new(0.0, 0.0, height);
+            let (mut phases, mut clock, mut lowest) = (Phases::new(Line, 20.0, 0.0), 0.0, f64::INFINITY);
+            while phases.phase() != Phase::Land {
+                clock += 0.1;
+                assert!(clock < 100.0, "stays in {}", phases.phase());
+                let position = phases.guided().map_or(stand, |guided| guided.at(clock).position);
+                let leaves = matches!(phases.phase(), Phase::Approach | Phase::Return);
+                if leaves && (position - stand).xy().norm() < 0.3 {
+                    lowest = lowest.min(position.z - stand.z);
+                }
+                let situation = Situation { now: clock, cause: None, position, heading: 0.0, ready: true, armed: true };
+                phases.advance(&situation);
             }
-            let situation = Situation { now: clock, cause: None, position, heading: 0.0, ready: true, armed: true };
-            phases.advance(&situation);
+            // One metre at the middle of a high one, one tenth of the way of 3 m and 2.5 m down less.
+            let least = if height > 1.7 { 0.7 } else { 0.39 };
+            assert!((least..=1.0).contains(&lowest), "{lowest} over {height}");
+            assert!((phases.painted() - Line.duration()).abs() < 1e-9);
         }
-        // One metre at the middle, one tenth of the way of 3 m and 2.5 m down less.
-        assert!((0.7..=1.0).contains(&lowest), "{lowest}");
-        assert!((phases.painted() - Line.duration()).abs() < 1e-9);
+    }
+
+    /// Set down on the stand by what made it hold, it rises before it goes anywhere.
+    #[test]
+    fn a_robot_that_stands_again_takes_off_again() {
+        let (mut phases, mut clock) = (Phases::new(Line, 20.0, 0.0), 0.0);
+        until(&mut phases, &mut clock, None, |phase| phase == Phase::TakeOff);
+        until(&mut phases, &mut clock, Some(Cause::PoseLost), |phase| phase == Phase::Hold(Cause::PoseLost));
+        until(&mut phases, &mut clock, None, |phase| !matches!(phase, Phase::Hold(_)));
+        assert_eq!(phases.phase(), Phase::TakeOff);
+        until(&mut phases, &mut clock, None, |phase| phase == Phase::Paint);
+        until(&mut phases, &mut clock, Some(Cause::PoseLost), |phase| phase == Phase::Hold(Cause::PoseLost));
+        until(&mut phases, &mut clock, None, |phase| !matches!(phase, Phase::Hold(_)));
+        assert_eq!(phases.phase(), Phase::Approach);
     }
 
     /// Above a small wall, where nothing of the map is in view, say.
