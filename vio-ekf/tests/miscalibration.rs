@@ -2,7 +2,7 @@
 //!
 //! `PAINTCOPTER_DATA=... cargo test --release -p vio-ekf --test miscalibration -- --ignored --nocapture`. `FLIGHTS=room_7,V1_02_imu`
 //! chooses flights (a name, `_`, the seed; `_imu`: recorded samples), `CASES=focal` the cases whose name holds that, `SECONDS=40` the
-//! length, `CAMERAS=1` or `2` one table of both.
+//! length, `CAMERAS=1` or `2` one table of both, `READOUT=30` the read-out of a rolling shutter, ms (of one camera).
 
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
@@ -31,14 +31,15 @@ const FLIGHTS: &str = "room_11,wall_12,V1_02_13,V1_02_imu,MH_04_imu";
 struct Given {
     cameras: [Camera; 2],
     time_offset_s: f64,
+    row_time_s: f64,
     samples: Vec<Imu>,
     swapped: bool,
 }
 
 impl Given {
     fn calibrations(&self) -> [CameraCalibration; 2] {
-        let time_offset_s = self.time_offset_s;
-        self.cameras.map(|camera| CameraCalibration { camera, rate_hz: None, time_offset_s, row_time_s: 0.0 })
+        let Self { time_offset_s, row_time_s, .. } = *self;
+        self.cameras.map(|camera| CameraCalibration { camera, rate_hz: None, time_offset_s, row_time_s })
     }
 }
 
@@ -124,6 +125,9 @@ fn cases() -> Vec<(String, Change)> {
     for millis in [5.0, -5.0, 20.0, -20.0, 50.0, -50.0] {
         add(format!("clock {millis:+} ms"), Box::new(move |g| g.time_offset_s = millis * 1e-3));
     }
+    for millis in [30.0, -30.0, 10.0, -10.0] {
+        add(format!("shutter {millis:+} ms"), Box::new(move |g| g.row_time_s += millis * 1e-3 / 480.0));
+    }
     add("swapped".into(), Box::new(|g| g.swapped = true));
     add("clipped".into(), Box::new(|g| clip(&mut g.samples, 10.5)));
     for percent in [5.0, -5.0] {
@@ -204,13 +208,13 @@ fn rested(flight: &Spline) -> Spline {
 }
 
 impl Flight {
-    fn new(name: &str, seconds: f64, count: usize) -> Option<Self> {
+    fn new(name: &str, seconds: f64, count: usize, readout_s: f64) -> Option<Self> {
         let (name, seed) = name.rsplit_once('_').unwrap();
         let seed = if seed == "imu" { 0 } else { seed.parse().unwrap() };
-        let both = cameras(name);
+        let (both, row_time_s) = (cameras(name), readout_s / 480.0);
         let scenario = Scenario {
             seed: seed.max(5),
-            cameras: both.map(|camera| SimulatedCamera { camera, ..SimulatedCamera::default() }).to_vec(),
+            cameras: both.map(|camera| SimulatedCamera { camera, row_time_s, ..SimulatedCamera::default() }).to_vec(),
             room: RoomSettings::default(),
             ..Scenario::default()
         };
@@ -233,7 +237,7 @@ impl Flight {
             let second = if count == 2 { simulation.frame(1, index).unwrap().unwrap().data } else { Vec::new() };
             frames.push((first.stamp, [first.data, second]));
         }
-        let given = Given { cameras: both, time_offset_s: 0.0, samples, swapped: false };
+        let given = Given { cameras: both, time_offset_s: 0.0, row_time_s, samples, swapped: false };
         Some(Self { simulation, given, frames })
     }
 
@@ -306,7 +310,8 @@ impl Flight {
             let mut calibrations = given.calibrations();
             doubt.correct(&mut calibrations);
             doubt.correct_samples(&mut given.samples);
-            (given.cameras, given.time_offset_s) = (calibrations.map(|c| c.camera), calibrations[0].time_offset_s);
+            given.cameras = calibrations.map(|c| c.camera);
+            (given.time_offset_s, given.row_time_s) = (calibrations[0].time_offset_s, calibrations[0].row_time_s);
             settings = doubt.freed(&settings);
             if doubt.found.is_none() {
                 break;
@@ -345,12 +350,15 @@ fn wrong_calibrations() {
     let variable = |name: &str, default: &str| std::env::var(name).unwrap_or_else(|_| default.into());
     let seconds: f64 = variable("SECONDS", "40").parse().unwrap();
     let (wanted, count) = (variable("CASES", ""), variable("CAMERAS", "1,2"));
+    let readout_s = 1e-3 * variable("READOUT", "0").parse::<f64>().unwrap();
     for name in variable("FLIGHTS", FLIGHTS).split(',') {
-        let Some(flight) = Flight::new(name, seconds, if count == "1" { 1 } else { 2 }) else { continue };
+        let Some(flight) = Flight::new(name, seconds, if count == "1" { 1 } else { 2 }, readout_s) else { continue };
         for count in count.split(',').map(|count| count.parse::<usize>().unwrap()) {
             println!("\n{name}, {count} camera(s): ATE mm, NEES, poses; with --calibrate; its doubts; what was said");
             for (case, change) in cases() {
-                if !case.contains(&wanted) || (case == "swapped" && count == 1) {
+                // Two cameras, or a rolling shutter.
+                let impossible = if count == 1 { case == "swapped" } else { case.starts_with("shutter") };
+                if !case.contains(&wanted) || impossible {
                     continue;
                 }
                 let mut given = flight.given.clone();

@@ -105,10 +105,14 @@ impl Recording {
 
     /// The calibration of the first camera in a line.
     pub(super) fn calibration_words(&self) -> String {
-        let CameraCalibration { camera, time_offset_s, .. } = &self.camera;
+        let CameraCalibration { camera, time_offset_s, row_time_s, .. } = &self.camera;
         let Camera { fx, fy, cx, cy, distortion, .. } = camera;
+        let shutter = match 1e6 * row_time_s {
+            0.0 => String::new(),
+            micros => format!(", line delay {micros:.1} us"),
+        };
         format!(
-            "focal lengths {fx:.1}, {fy:.1} px, principal point {cx:.1}, {cy:.1} px, {distortion:.3?}, clock {:.1} ms",
+            "focal lengths {fx:.1}, {fy:.1} px, principal point {cx:.1}, {cy:.1} px, {distortion:.3?}, clock {:.1} ms{shutter}",
             1e3 * time_offset_s
         )
     }

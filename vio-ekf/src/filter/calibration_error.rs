@@ -41,6 +41,7 @@ impl CalibrationError {
         set(error_state::ACCEL_MATRIX, matrix.transpose().as_slice());
         if let (Some(lens), Some(given)) = (&state.lens, first.kalibr()) {
             set(error_state::INTRINSICS, &lens.intrinsics_less(&given.estimable()));
+            set(error_state::ROW_TIME, &[state.row_time - settings.calibration.row_time_s]);
             set(error_state::GYRO_SCALE, state.gyro_scale.add_scalar(-1.0).as_slice());
         }
         let given = second.and_then(|second| SecondCamera::new(first, second));
@@ -74,6 +75,8 @@ pub(crate) fn calibration_of(state: &VioState, covariance: &Covariance) -> Calib
         covariance: covariance.block(error_state::CAMERA_POSITION, error_state::CAMERA_POSITION),
         accel_matrix: state.accel_matrix(),
         accel_matrix_sigma: Matrix3::from_fn(|r, c| deviation(error_state::ACCEL_MATRIX + 3 * r + c)),
+        row_time_s: state.row_time,
+        row_time_sigma_s: state.lens.map_or(0.0, |_| deviation(error_state::ROW_TIME)),
         gyro_scale: state.gyro_scale,
         gyro_scale_sigma: match state.lens {
             Some(_) => Vector3::from_fn(|k, _| deviation(error_state::GYRO_SCALE + k)),
@@ -94,6 +97,7 @@ pub(crate) fn given_calibration(
         camera_attitude: pose.rotation,
         time_offset: settings.calibration.time_offset_s,
         accel_matrix: state.accel_matrix.map(|_| Matrix3::identity()),
+        row_time: settings.calibration.row_time_s,
         gyro_scale: Vector3::repeat(1.0),
         lens: state.lens.and_then(|_| first.kalibr()).map(Camera::estimable),
         second: state.second.and_then(|_| SecondCamera::new(first, second?)),

@@ -38,6 +38,9 @@ pub(crate) fn set_calibration(covariance: &mut Covariance, state: &VioState, set
         }
     }
     if state.lens.is_some() {
+        // Rolling shutters are known of one camera alone.
+        let row_time_sigma = if state.second.is_some() { 0.0 } else { calibration.row_time_sigma_s };
+        covariance.reset_row(error_state::ROW_TIME, row_time_sigma.powi(2));
         covariance.set_diagonal3(error_state::GYRO_SCALE, [imu.gyro_scale_sigma; 3]);
     }
     set_lenses(covariance, state, calibration);

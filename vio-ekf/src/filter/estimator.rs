@@ -59,6 +59,7 @@ impl Estimator {
             time_offset: settings.calibration.time_offset_s,
             depth_prior: InverseDistance::new(settings.landmarks.inverse_distance),
             accel_matrix: None,
+            row_time: settings.calibration.row_time_s,
             gyro_scale: Vector3::repeat(1.0),
             lens: None,
             second: None,

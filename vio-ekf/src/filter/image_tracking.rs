@@ -34,7 +34,7 @@ pub(crate) fn align_and_update(
     choose(tracking, settings.landmarks.max_measured);
     let TrackingState { estimator, tracks, .. } = tracking;
     let offset = estimator.state.time_offset;
-    let shutter = RollingShutter::new(camera, settings);
+    let shutter = RollingShutter::new(camera, estimator.state.row_time);
     for (slot, track) in tracks.iter_mut().enumerate() {
         let time_offset_error = estimator.state.time_offset - offset;
         estimator.settle(slot);
@@ -168,7 +168,7 @@ pub(crate) fn update_templates(
     settings: &Settings,
 ) {
     let TrackingState { estimator, tracks, .. } = tracking;
-    let shutter = RollingShutter::new(camera, settings);
+    let shutter = RollingShutter::new(camera, estimator.state.row_time);
     let settings = &settings.patches;
     for (slot, track) in tracks.iter_mut().enumerate() {
         if track.failures > 0 {
@@ -203,7 +203,7 @@ pub(crate) fn detect_landmarks(
     let ImageFrontend { pyramid, detector, next_id } = frontend;
     let TrackingState { estimator, tracks, .. } = tracking;
     let criteria = DetectionCriteria::from(&settings.patches);
-    let shutter = RollingShutter::new(camera, settings);
+    let shutter = RollingShutter::new(camera, estimator.state.row_time);
     let present = estimator.state.landmarks.iter().filter_map(|l| camera.project(&l.bearing.direction()));
     detector.detect(pyramid, &present, &criteria);
     let before = tracks.len();

@@ -132,7 +132,7 @@ impl Initializing {
         let rotation = self.dynamic_initializer.rotation_since_image(time);
         let criteria = DetectionCriteria::from(&settings.patches);
         self.klt_tracker.track(rotation, pyramid, (detector, &criteria), camera.as_ref());
-        let shutter = RollingShutter::new(camera.as_ref(), settings);
+        let shutter = RollingShutter::new(camera.as_ref(), settings.calibration.row_time_s);
         let turn =
             camera.body_from_camera().rotation.inverse() * sensors.last_sample.map_or(Vector3::zeros(), |s| s.gyro);
         // Each back to the time of the stamp, as far as the gyroscope tells.

@@ -9,6 +9,7 @@ use super::state::bearing::Bearing;
 use super::state::error_state;
 use super::state::inverse_distance::InverseDistance;
 use super::state::landmark::{Landmark, project};
+use super::state::rolling_shutter::RollingShutter;
 
 /// Adds a landmark seen in the current image, at the distance of the shared depth prior; there must be room. `covariance` is that of
 /// its tangent coordinates.
@@ -104,12 +105,17 @@ fn enter_bearing(estimator: &mut Estimator, row: usize, landmark: &Landmark, cov
     // Nor is a lens that is off what the bearing was measured with.
     let by_lens = estimator.state.lens.and_then(|lens| {
         let direction = landmark.bearing.direction();
-        let tangent_by_pixel = project(&lens, &landmark.bearing)?.1.try_inverse()?;
-        Some(tangent_by_pixel * lens.intrinsics_jacobian(&direction)?)
+        let (pixel, pixel_by_tangent) = project(&lens, &landmark.bearing)?;
+        let rows = RollingShutter::new(&lens, estimator.state.row_time).rows_after_stamp(&pixel);
+        let by_lens = pixel_by_tangent.try_inverse()? * lens.intrinsics_jacobian(&direction)?;
+        Some((by_lens, rate * rows))
     });
-    for (k, column) in by_lens.iter().flat_map(|by_lens| by_lens.column_iter().enumerate()) {
-        estimator.covariance.add_row(row, -column[0], error_state::INTRINSICS + k);
-        estimator.covariance.add_row(row + 1, -column[1], error_state::INTRINSICS + k);
+    if let Some((by_lens, by_row_time)) = by_lens {
+        let lens = (error_state::INTRINSICS..).zip(by_lens.column_iter().map(|column| [column[0], column[1]]));
+        for (of, column) in lens.chain([(error_state::ROW_TIME, by_row_time.into())]) {
+            estimator.covariance.add_row(row, -column[0], of);
+            estimator.covariance.add_row(row + 1, -column[1], of);
+        }
     }
     for (r, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         estimator.covariance.row_mut(row + r)[row + c] += covariance[(r, c)];

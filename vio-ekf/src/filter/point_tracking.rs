@@ -21,7 +21,6 @@ pub(crate) fn update_with_points(
     report: &mut FrameReport,
 ) {
     let offset = tracking.estimator.state.time_offset;
-    let shutter = RollingShutter::new(camera, settings);
     for track in &mut tracking.tracks {
         track.in_view = false;
     }
@@ -41,7 +40,7 @@ pub(crate) fn update_with_points(
             landmark,
             rate: estimator.bearing_rate(&landmark),
             time_offset_error: estimator.state.time_offset - offset,
-            delay: shutter.delay(&point.pixel),
+            shutter: RollingShutter::new(camera, estimator.state.row_time),
             camera,
             lens,
             landmarks: &settings.landmarks,
@@ -80,7 +79,7 @@ pub(crate) fn add_points(
     settings: &Settings,
 ) -> usize {
     let before = tracking.tracks.len();
-    let shutter = RollingShutter::new(camera, settings);
+    let shutter = RollingShutter::new(camera, tracking.estimator.state.row_time);
     for point in points {
         if tracking.tracks.len() == settings.landmarks.max_count {
             break;

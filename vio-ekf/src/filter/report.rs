@@ -55,6 +55,10 @@ pub struct Calibration {
     pub accel_matrix: Matrix3<f64>,
     /// Standard deviation of each of its entries.
     pub accel_matrix_sigma: Matrix3<f64>,
+    /// Time from the exposure of a row of the first camera until that of the row below, s.
+    pub row_time_s: f64,
+    /// Its standard deviation; 0 where it is not estimated ([`CalibrationSettings::row_time_sigma_s`](crate::filter::CalibrationSettings::row_time_sigma_s)).
+    pub row_time_sigma_s: f64,
     /// Rate by what the gyroscope reads, axis by axis; one where that is not estimated
     /// ([`ImuSettings::gyro_scale_sigma`](crate::inertial::ImuSettings::gyro_scale_sigma)).
     pub gyro_scale: Vector3<f64>,

@@ -334,6 +334,7 @@ impl Vio {
             check_model(&first.camera)?;
             sensors.camera = Arc::new(first.camera);
             sensors.settings.calibration.time_offset_s = first.time_offset_s;
+            sensors.settings.calibration.row_time_s = first.row_time_s;
             if let [second] = others {
                 sensors.stereo = Some(StereoCamera::new(&first.camera, Arc::new(second.camera), &settings.patches)?);
             }

@@ -34,6 +34,8 @@ pub enum CalibrationPart {
     PrincipalPoint,
     /// First terms of the distortion.
     Distortion,
+    /// Time from a row of the image to the next.
+    RollingShutter,
     /// Focal length of the second camera.
     SecondFocalLength,
     /// Its principal point.
@@ -57,6 +59,8 @@ pub struct CalibrationDoubt {
     pub(super) given_pose: Isometry3<f64>,
     /// What has to be added to the offset of the camera's clock, s.
     pub(super) clock_change_s: f64,
+    /// The same of the time of a row, s.
+    pub(super) row_time_change_s: f64,
     /// In words, with what was found.
     pub(super) words: String,
 }
@@ -101,6 +105,7 @@ impl CalibrationDoubt {
                     calibration.principal_point_sigma_px = near.principal_point_sigma_px;
                 }
                 Part::Distortion | Part::SecondDistortion => calibration.distortion_sigma = near.distortion_sigma,
+                Part::RollingShutter => calibration.row_time_sigma_s = near.row_time_sigma_s,
                 Part::StereoPose => {
                     calibration.stereo_attitude_sigma = near.stereo_attitude_sigma;
                     calibration.stereo_position_sigma_m = near.stereo_position_sigma_m;
@@ -136,6 +141,9 @@ impl CalibrationDoubt {
             camera.body_from_camera = if index == 0 { after } else { after * first_from_this };
             if doubted(Part::Clock) {
                 calibration.time_offset_s += self.clock_change_s;
+            }
+            if index == 0 && doubted(Part::RollingShutter) {
+                calibration.row_time_s += self.row_time_change_s;
             }
             let Some(lens) = lens else { continue };
             if index == 1 && doubted(Part::StereoPose) {
@@ -210,6 +218,13 @@ pub(super) fn describe(part: CalibrationPart, found: &Calibration, given: &Vio) 
         Part::FocalLength => focal("focal lengths", given, lens),
         Part::PrincipalPoint => centre("principal point", given, lens),
         Part::Distortion => distortion("distortion", given, lens),
+        Part::RollingShutter => {
+            let [given, found] = [settings.calibration.row_time_s, found.row_time_s].map(|row| 1e6 * row);
+            let whole = 1e-3 * found * camera.image_size().1 as f64;
+            format!(
+                "rolling shutter, {given:.1} us from row to row (line_delay), found {found:.1}: {whole:.1} ms an image"
+            )
+        }
         Part::SecondFocalLength => focal("focal lengths of the second camera", others, other),
         Part::SecondPrincipalPoint => centre("principal point of the second camera", others, other),
         Part::SecondDistortion => distortion("distortion of the second camera", others, other),
@@ -241,6 +256,8 @@ pub(super) mod tests {
             covariance: SMatrix::zeros(),
             accel_matrix: Matrix3::identity() * 1.25,
             accel_matrix_sigma: Matrix3::zeros(),
+            row_time_s: 6e-5,
+            row_time_sigma_s: 0.0,
             gyro_scale: Vector3::new(1.0, 0.5, 2.0),
             gyro_scale_sigma: Vector3::zeros(),
         }
@@ -253,6 +270,7 @@ pub(super) mod tests {
             found: Some(*found),
             given_pose,
             clock_change_s: 0.0,
+            row_time_change_s: 0.0,
             words: String::new(),
         }
     }

@@ -32,7 +32,7 @@ const MOST_WAITING: usize = 8;
 use CalibrationPart as Part;
 
 /// Rows of each part, and how well the best calibrations agree with each other in it: less is not doubted.
-const PARTS: [(Part, usize, &[f64]); 12] = [
+const PARTS: [(Part, usize, &[f64]); 13] = [
     (Part::CameraAttitude, error_state::CAMERA_ATTITUDE, &[1e-3; 3]),
     (Part::CameraPosition, error_state::CAMERA_POSITION, &[5e-3; 3]),
     (Part::Clock, error_state::TIME_OFFSET, &[5e-4]),
@@ -41,6 +41,7 @@ const PARTS: [(Part, usize, &[f64]); 12] = [
     (Part::FocalLength, error_state::INTRINSICS, &[0.4; 2]),
     (Part::PrincipalPoint, error_state::INTRINSICS + 2, &[0.4; 2]),
     (Part::Distortion, error_state::INTRINSICS + 4, &[2e-3; 2]),
+    (Part::RollingShutter, error_state::ROW_TIME, &[2e-6]),
     (Part::SecondFocalLength, error_state::SECOND_INTRINSICS, &[0.4; 2]),
     (Part::SecondPrincipalPoint, error_state::SECOND_INTRINSICS + 2, &[0.4; 2]),
     (Part::SecondDistortion, error_state::SECOND_INTRINSICS + 4, &[2e-3; 2]),
@@ -165,7 +166,9 @@ impl CalibrationWatch {
                  {exchanged} the other way round"
             );
             let (parts, given_pose) = (vec![Part::CameraOrder], self.given.camera().body_from_camera());
-            return Some(Some(CalibrationDoubt { parts, found: None, given_pose, clock_change_s: 0.0, words }));
+            let (clock_change_s, row_time_change_s) = (0.0, 0.0);
+            let doubt = CalibrationDoubt { parts, found: None, given_pose, clock_change_s, row_time_change_s, words };
+            return Some(Some(doubt));
         }
         let vio = match &mut self.stage {
             Stage::Search(vio) => vio,
@@ -256,6 +259,7 @@ impl CalibrationWatch {
                 found: Some(calibration),
                 given_pose: self.given.camera().body_from_camera(),
                 clock_change_s: error[error_state::TIME_OFFSET],
+                row_time_change_s: error[error_state::ROW_TIME],
                 words: words.join("; "),
             })
         };

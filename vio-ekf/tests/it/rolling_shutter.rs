@@ -3,6 +3,8 @@
 use crate::support::sequences::drawn_start;
 use vio_ekf::eval::{Alignment, ate};
 use vio_ekf::filter::CalibrationSettings;
+use vio_ekf::format::calibration::CameraCalibration;
+use vio_ekf::run::{CalibrationPart, RecordedFrame, check_calibration};
 use vio_ekf::sim::{
     Frame, Photometry, RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, painting_flight,
 };
@@ -55,11 +57,9 @@ fn each_row_is_seen_at_its_own_time() {
     assert!(right < 0.1 * wrong, "{right} {wrong}");
 }
 
-/// Absolute trajectory error of a flight, m.
-fn fly(readout: f64, known: bool) -> f64 {
+/// Absolute trajectory error of a flight, m, and its filter in the end.
+fn fly(readout: f64, calibration: CalibrationSettings) -> (f64, Vio) {
     let simulation = simulation(painting_flight(2, 12.0).unwrap(), readout, Photometry::default(), 20.0);
-    let row_time_s = if known { readout / HEIGHT as f64 } else { 0.0 };
-    let calibration = CalibrationSettings { row_time_s, ..CalibrationSettings::default() };
     let mut vio = Vio::new(lens(), ImuNoise::default(), Settings { calibration, ..Settings::default() }).unwrap();
     let mut frames = simulation.frames(0).map(Result::unwrap).peekable();
     let (mut truth, mut estimate) = (Trajectory::default(), Trajectory::default());
@@ -77,15 +77,59 @@ fn fly(readout: f64, known: bool) -> f64 {
             }
         }
     }
-    ate(truth.poses(), estimate.poses(), Alignment::Se3).unwrap().position.rmse
+    (ate(truth.poses(), estimate.poses(), Alignment::Se3).unwrap().position.rmse, vio)
+}
+
+fn told(readout: f64) -> CalibrationSettings {
+    CalibrationSettings { row_time_s: readout / HEIGHT as f64, ..CalibrationSettings::default() }
 }
 
 #[test]
 fn a_shutter_that_is_known_costs_nothing_and_one_that_is_not_does() {
-    let [global, known, ignored] = [(0.0, false), (READOUT, true), (READOUT, false)].map(|(r, k)| fly(r, k));
+    let [global, known, ignored] =
+        [(0.0, 0.0), (READOUT, READOUT), (READOUT, 0.0)].map(|(readout, said)| fly(readout, told(said)).0);
     eprintln!("ATE {:.1} mm, rolling {:.1} mm, not told {:.1} mm", 1e3 * global, 1e3 * known, 1e3 * ignored);
     assert!(known < 1.5 * global + 1e-3, "{known} {global}");
     assert!(ignored > 3.0 * known, "{ignored} {known}");
+}
+
+/// From a global shutter, and from one that reads upwards, two deviations away.
+#[test]
+fn a_read_out_that_is_not_told_is_found() {
+    let right = READOUT / HEIGHT as f64;
+    let known = fly(READOUT, told(READOUT)).0;
+    for given in [0.0, -READOUT] {
+        let (error, vio) = fly(READOUT, CalibrationSettings { row_time_sigma_s: right, ..told(given) });
+        let found = vio.calibration().unwrap();
+        let off = found.row_time_s - right;
+        let (all, sigma) = (READOUT / right, found.row_time_sigma_s);
+        eprintln!("off by {:.2} ms, sigma {:.2} ms, ATE {error:.4} m", 1e3 * off * all, 1e3 * sigma * all);
+        // Of 30 ms; a deviation that shrinks as it has to.
+        assert!(off.abs() < 0.05 * right && sigma < 0.02 * right, "{off} {sigma}");
+        assert!(error < 1.5 * known + 1e-3, "{error} {known}");
+    }
+}
+
+/// By the second filter, and put right by what it says: then there is nothing to say.
+#[test]
+fn a_rolling_shutter_that_is_taken_for_a_global_one_is_named() {
+    let seen = simulation(painting_flight(3, 22.0).unwrap(), READOUT, Photometry::default(), 20.0);
+    let frames: Vec<Frame> = seen.frames(0).map(Result::unwrap).collect();
+    let samples = seen.imu(0).unwrap().samples;
+    let checked = |camera: &CameraCalibration| {
+        let calibration = CalibrationSettings { row_time_s: camera.row_time_s, ..CalibrationSettings::default() };
+        let settings = Settings { calibration, ..Settings::default() };
+        let vio = Vio::new(camera.camera, ImuNoise::default(), settings).unwrap();
+        check_calibration(&vio, &samples, || {
+            frames.iter().map(|frame| RecordedFrame::single(frame.stamp, frame.clone()))
+        })
+    };
+    let mut camera = CameraCalibration { camera: lens(), rate_hz: None, time_offset_s: 0.0, row_time_s: 0.0 };
+    let doubt = checked(&camera).expect("30 ms of read-out");
+    assert_eq!(doubt.parts, [CalibrationPart::RollingShutter], "{doubt}");
+    doubt.correct(std::slice::from_mut(&mut camera));
+    assert!((camera.row_time_s * HEIGHT as f64 - READOUT).abs() < 2e-3, "{doubt}");
+    assert_eq!(checked(&camera), None);
 }
 
 #[test]
@@ -110,7 +154,7 @@ fn what_a_shutter_cannot_be_is_refused() {
 #[cfg(feature = "yaml")]
 #[test]
 fn files_say_how_long_a_row_takes() {
-    use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration, read_asl_camera, write_asl_camera};
+    use vio_ekf::format::calibration::{ImuCalibration, read_asl_camera, write_asl_camera};
 
     let global = CameraCalibration { camera: Camera::euroc(), rate_hz: None, time_offset_s: 0.0, row_time_s: 0.0 };
     assert!(!write_asl_camera(&global).contains("line_delay"));

@@ -62,7 +62,7 @@ pub(crate) fn align_patch<const C: usize>(
         time_offset_error,
         camera,
         lens: estimator.state.lens,
-        shutter: RollingShutter::new(camera, settings),
+        shutter: RollingShutter::new(camera, estimator.state.row_time),
         settings: &settings.patches,
         coarse: Cell::new(true),
         last_step: Cell::new(SVector::zeros()),
@@ -72,7 +72,7 @@ pub(crate) fn align_patch<const C: usize>(
     if !Patch::is_inside(pyramid, &pixel, &(by_bearing * landmark.warp)) {
         return PatchAlignment::OutOfView;
     }
-    let first = initial_guess(estimator, &measurement, &by_bearing);
+    let first = initial_guess(estimator, &measurement, (&pixel, &by_bearing));
     measurement.last_step.set(first);
     let iteration = Iteration { limit: COARSE_ITERATIONS, tolerance: 1e-2 };
     // Its outcome does not matter, only where it ended: the gates judge the alignment on all levels.
@@ -104,9 +104,9 @@ pub(crate) fn align_patch<const C: usize>(
 fn initial_guess<const C: usize>(
     estimator: &Estimator,
     measurement: &PatchMeasurement<C>,
-    by_bearing: &Matrix2<f64>,
+    (pixel, by_bearing): (&Vector2<f64>, &Matrix2<f64>),
 ) -> SVector<f64, C> {
-    let eigen = predicted(estimator, measurement, by_bearing).symmetric_eigen();
+    let eigen = predicted(estimator, measurement, (pixel, by_bearing)).symmetric_eigen();
     let longest = eigen.eigenvalues.imax();
     let deviation = eigen.eigenvalues[longest].max(0.0).sqrt();
     let spacing = GUESS_SPACING / measurement.pyramid.patch_levels()[LEVELS - 1].scale;
@@ -133,7 +133,7 @@ fn initial_guess<const C: usize>(
 fn predicted<const C: usize>(
     estimator: &Estimator,
     measurement: &PatchMeasurement<C>,
-    by_bearing: &Matrix2<f64>,
+    (pixel, by_bearing): (&Vector2<f64>, &Matrix2<f64>),
 ) -> Matrix2<f64> {
     let row = measurement.row;
     let by_direction = |covariance: Matrix2<f64>| by_bearing * covariance * by_bearing.transpose();
@@ -146,6 +146,8 @@ fn predicted<const C: usize>(
     let mut jacobian = SMatrix::<f64, 2, { WITH_LENS - 1 }>::zeros();
     jacobian.fixed_columns_mut::<2>(0).copy_from(by_bearing);
     jacobian.fixed_columns_mut::<INTRINSICS>(2).copy_from(&by_lens);
+    let by_row_time = by_bearing * measurement.rate * measurement.shutter.rows_after_stamp(pixel);
+    jacobian.set_column(2 + INTRINSICS, &by_row_time);
     let rows = std::array::from_fn(|k| if k < 2 { row + k } else { error_state::INTRINSICS + k - 2 });
     jacobian * estimator.covariance.marginal::<{ WITH_LENS - 1 }>(&rows) * jacobian.transpose()
 }

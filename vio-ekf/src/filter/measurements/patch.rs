@@ -17,11 +17,13 @@ use crate::filter::state::landmark::{Landmark, project};
 use crate::filter::state::rolling_shutter::RollingShutter;
 use crate::inertial::iterated_update::Linearization;
 
-/// Rows that a patch depends on, without its lens and with it.
+/// Rows that a patch depends on, without its lens and its shutter and with them.
 pub(crate) const WITHOUT_LENS: usize = 3;
-pub(crate) const WITH_LENS: usize = WITHOUT_LENS + INTRINSICS;
+pub(crate) const WITH_LENS: usize = WITHOUT_LENS + INTRINSICS + 1;
+/// The last of them: the time of a row.
+pub(crate) const ROW_TIME: usize = WITH_LENS - 1;
 
-/// A patch in an image, of a lens that is known (`C` is 3) or estimated (9). The residual is whitened by the square root of the normal matrix of its alignment, so that the 72 pixels of
+/// A patch in an image, of a lens and a shutter that are known (`C` is 3) or estimated (10). The residual is whitened by the square root of the normal matrix of its alignment, so that the 72 pixels of
 /// both levels become two values, whatever the warp.
 #[derive(Debug)]
 pub(crate) struct PatchMeasurement<'a, const C: usize> {
@@ -54,7 +56,7 @@ impl<const C: usize> PatchMeasurement<'_, C> {
     pub(crate) fn project(&self, delta: &SVector<f64, C>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
         let bearing = self.bearing(delta);
         match self.lens_after(delta) {
-            Some(lens) => self.shutter.project(&lens, &bearing, &self.rate),
+            Some(lens) => self.shutter.slower(delta[ROW_TIME]).project(&lens, &bearing, &self.rate),
             None => self.shutter.project(self.camera, &bearing, &self.rate),
         }
     }
@@ -104,6 +106,7 @@ impl<const C: usize> Measurement<2, C> for PatchMeasurement<'_, C> {
             let tangent_by_pixel = project(&lens, &bearing)?.1.try_inverse()?;
             let by_lens = by_tangent * tangent_by_pixel * lens.intrinsics_jacobian(&bearing.direction())?;
             jacobian.columns_mut(WITHOUT_LENS, INTRINSICS).copy_from(&by_lens);
+            jacobian.set_column(ROW_TIME, &(by_tangent * self.rate * self.shutter.rows_after_stamp(&pixel)));
         }
         let residual = factor.transpose().solve_lower_triangular(&comparison.gradient)?;
         let intensity = self.settings.intensity_sigma.powi(2).max(comparison.residual / comparison.freedom);

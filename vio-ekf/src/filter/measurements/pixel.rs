@@ -3,13 +3,14 @@
 use nalgebra::{Matrix2, SMatrix, Vector2};
 
 use super::measurement::{Measurement, Trial};
-use super::patch::{WITH_LENS, WITHOUT_LENS};
+use super::patch::{ROW_TIME, WITH_LENS, WITHOUT_LENS};
 use crate::camera::Camera;
 use crate::camera::intrinsics::INTRINSICS;
 use crate::camera::model::CameraModel;
 use crate::filter::settings::{LandmarkSettings, UpdateSettings};
 use crate::filter::state::error_state::bearing_and_camera;
 use crate::filter::state::landmark::{Landmark, project};
+use crate::filter::state::rolling_shutter::RollingShutter;
 use crate::inertial::iterated_update::Linearization;
 
 /// A pixel of the first camera.
@@ -24,8 +25,7 @@ pub(crate) struct PixelMeasurement<'a, const C: usize> {
     pub(crate) rate: Vector2<f64>,
     /// Change of the time offset since the state was propagated to the image, s.
     pub(crate) time_offset_error: f64,
-    /// From the stamp of the image until the row of the pixel is exposed, s.
-    pub(crate) delay: f64,
+    pub(crate) shutter: RollingShutter,
     pub(crate) camera: &'a dyn CameraModel,
     /// The camera where its intrinsics are estimated.
     pub(crate) lens: Option<Camera>,
@@ -36,8 +36,8 @@ pub(crate) struct PixelMeasurement<'a, const C: usize> {
 impl<'a> PixelMeasurement<'a, WITHOUT_LENS> {
     /// The same that depends on the lens.
     pub(crate) fn with_lens(self) -> PixelMeasurement<'a, WITH_LENS> {
-        let Self { row, pixel, landmark, rate, time_offset_error, delay, camera, lens, landmarks, update } = self;
-        PixelMeasurement { row, pixel, landmark, rate, time_offset_error, delay, camera, lens, landmarks, update }
+        let Self { row, pixel, landmark, rate, time_offset_error, shutter, camera, lens, landmarks, update } = self;
+        PixelMeasurement { row, pixel, landmark, rate, time_offset_error, shutter, camera, lens, landmarks, update }
     }
 }
 
@@ -48,7 +48,10 @@ impl<const C: usize> Measurement<2, C> for PixelMeasurement<'_, C> {
 
     fn linearize(&self, trial: &Trial<'_, C>) -> Option<Linearization<2, C>> {
         let delta = trial.delta;
-        let step = Vector2::new(delta[0], delta[1]) + self.rate * (self.time_offset_error + self.delay + delta[2]);
+        let is_estimated = self.lens.is_some() && C > WITHOUT_LENS;
+        let shutter = if is_estimated { self.shutter.slower(delta[ROW_TIME]) } else { self.shutter };
+        let since = self.time_offset_error + shutter.delay(&self.pixel) + delta[2];
+        let step = Vector2::new(delta[0], delta[1]) + self.rate * since;
         let bearing = self.landmark.bearing.boxplus(&step);
         let changed: Option<Camera> = self
             .lens
@@ -63,6 +66,7 @@ impl<const C: usize> Measurement<2, C> for PixelMeasurement<'_, C> {
         if let Some(lens) = &changed {
             let by_lens = lens.intrinsics_jacobian(&bearing.direction())?;
             jacobian.columns_mut(WITHOUT_LENS, INTRINSICS).copy_from(&by_lens);
+            jacobian.set_column(ROW_TIME, &(by_bearing * self.rate * shutter.rows_after_stamp(&self.pixel)));
         }
         let noise = Matrix2::identity() * self.landmarks.pixel_sigma.powi(2);
         Some(Linearization { residual: self.pixel - pixel, jacobian, noise })
@@ -101,7 +105,7 @@ mod tests {
             landmark,
             rate: Vector2::new(0.3, -0.5),
             time_offset_error: 0.0,
-            delay: 0.0,
+            shutter: RollingShutter::new(&camera, 0.0),
             camera: &camera,
             lens: Some(camera),
             landmarks: &settings.landmarks,

@@ -33,12 +33,14 @@ pub struct CalibrationSettings {
     /// Time from the exposure of a row until that of the row below, s: rolling shutter. 0, a global shutter. The stamp of an image is
     /// then that of its middle row. One camera only.
     pub row_time_s: f64,
+    /// Its standard deviation, s; ours: 0. It is estimated with the intrinsics, and with one camera only.
+    pub row_time_sigma_s: f64,
 }
 
 impl CalibrationSettings {
     /// Of what is left of a ruler, a guess, or another camera's file, all of it estimated: lenses to 3 %, 10 pixels and 0.15 of the
-    /// first term of the distortion; the camera on the body to 3 cm and 3 degrees, its clock to 15 ms; two cameras to 2 mm and half a
-    /// degree.
+    /// first term of the distortion; the camera on the body to 3 cm and 3 degrees, its clock to 15 ms; the read-out of 480 rows to 24 ms,
+    /// of one camera alone; two cameras to 2 mm and half a degree.
     #[must_use]
     pub fn roughly(self) -> Self {
         Self {
@@ -50,6 +52,7 @@ impl CalibrationSettings {
             distortion_sigma: 0.15,
             stereo_attitude_sigma: 0.01,
             stereo_position_sigma_m: 0.002,
+            row_time_sigma_s: 5e-5,
             ..self
         }
     }
@@ -73,6 +76,7 @@ impl CalibrationSettings {
             distortion_sigma: 0.0,
             stereo_attitude_sigma: 0.0,
             stereo_position_sigma_m: 0.0,
+            row_time_sigma_s: 0.0,
             ..self
         }
     }
@@ -90,13 +94,16 @@ impl CalibrationSettings {
             distortion_sigma: 0.1 * rough.distortion_sigma,
             stereo_attitude_sigma: 0.1 * rough.stereo_attitude_sigma,
             stereo_position_sigma_m: 0.1 * rough.stereo_position_sigma_m,
+            row_time_sigma_s: 0.1 * rough.row_time_sigma_s,
             ..self
         }
     }
 
     /// Whether the intrinsics are estimated.
     pub(crate) fn estimates_intrinsics(&self) -> bool {
-        self.focal_sigma > 0.0 || self.principal_point_sigma_px > 0.0 || self.distortion_sigma > 0.0
+        [self.focal_sigma, self.principal_point_sigma_px, self.distortion_sigma, self.row_time_sigma_s]
+            .iter()
+            .any(|sigma| *sigma > 0.0)
     }
 
     pub(super) fn check(&self) -> Result<(), Error> {
@@ -121,6 +128,7 @@ impl CalibrationSettings {
             ("distortion_sigma", self.distortion_sigma),
             ("stereo_attitude_sigma", self.stereo_attitude_sigma),
             ("stereo_position_sigma_m", self.stereo_position_sigma_m),
+            ("row_time_sigma_s", self.row_time_sigma_s),
         ])
     }
 }

@@ -1,8 +1,8 @@
 //! First row of each block of the odometry's error state.
 //!
 //! ```text
-//! rows   0  3  6  9  12 | 15       18       21      22           23           | 32          38           41            | then 3 each
-//!        p  v  R  b_g b_a | camera's pose  offset  depth prior  accel. matrix | intrinsics  gyro. scale  second camera | landmark: bearing (2), inverse distance (1)
+//! rows   0  3  6  9  12 | 15       18       21      22           23           | 32          38        39           42            | then 3 each
+//!        p  v  R  b_g b_a | camera's pose  offset  depth prior  accel. matrix | intrinsics  row time  gyro. scale  second camera | landmark: bearing (2), inverse distance (1)
 //! ```
 
 use crate::camera::intrinsics;
@@ -24,8 +24,10 @@ pub(crate) const MATRIX_SIZE: usize = 9;
 pub(crate) const FIXED: usize = 32;
 /// Intrinsics of the first camera, where they are estimated: focal lengths, principal point, first two terms of the distortion.
 pub const INTRINSICS: usize = FIXED;
+/// Time of a row of the first camera's shutter, where intrinsics are estimated, s.
+pub const ROW_TIME: usize = INTRINSICS + intrinsics::INTRINSICS;
 /// Scales of the gyroscope's axes, where intrinsics are estimated: relative errors.
-pub const GYRO_SCALE: usize = INTRINSICS + intrinsics::INTRINSICS;
+pub const GYRO_SCALE: usize = ROW_TIME + 1;
 /// Intrinsics of a second camera, then its attitude (error on its own side) and the position of the first camera in its axes.
 pub(crate) const SECOND_INTRINSICS: usize = GYRO_SCALE + 3;
 pub(crate) const SECOND_ATTITUDE: usize = SECOND_INTRINSICS + intrinsics::INTRINSICS;
@@ -45,7 +47,7 @@ pub(crate) const fn landmark(head: usize, slot: usize) -> usize {
     head + LANDMARK_SIZE * slot
 }
 
-/// Rows of a landmark's bearing, of the time offset, and of as many intrinsics as there is room for.
+/// Rows of a landmark's bearing, of the time offset, and, where there is room for them, of the intrinsics and the time of a row.
 pub(crate) fn bearing_and_camera<const C: usize>(landmark: usize) -> [usize; C] {
     std::array::from_fn(|k| match k {
         0 | 1 => landmark + k,

@@ -5,7 +5,6 @@ use nalgebra::{Matrix2, Vector2};
 use super::bearing::Bearing;
 use super::landmark::project;
 use crate::camera::model::CameraModel;
-use crate::filter::settings::Settings;
 
 /// Iterations for the row in which a landmark is seen: each shortens the error by the pixels that it moves per row, some per cent.
 const ITERATIONS: usize = 4;
@@ -18,14 +17,24 @@ pub(crate) struct RollingShutter {
 }
 
 impl RollingShutter {
-    pub(crate) fn new(camera: &dyn CameraModel, settings: &Settings) -> Self {
+    pub(crate) fn new(camera: &dyn CameraModel, row_time: f64) -> Self {
         let middle_row = 0.5 * (camera.image_size().1 as f64 - 1.0);
-        Self { row_time: settings.calibration.row_time_s, middle_row }
+        Self { row_time, middle_row }
+    }
+
+    /// The same with rows that take longer.
+    pub(crate) fn slower(&self, change: f64) -> Self {
+        Self { row_time: self.row_time + change, ..*self }
     }
 
     /// Seconds from the stamp of the image until a pixel is exposed.
     pub(crate) fn delay(&self, pixel: &Vector2<f64>) -> f64 {
-        self.row_time * (pixel.y - self.middle_row)
+        self.row_time * self.rows_after_stamp(pixel)
+    }
+
+    /// Rows from the one that belongs to the stamp down to a pixel: derivative of the delay by the time of a row.
+    pub(crate) fn rows_after_stamp(&self, pixel: &Vector2<f64>) -> f64 {
+        pixel.y - self.middle_row
     }
 
     /// Pixel in which a bearing that moves at a rate, tangent coordinates per second, is seen, and its derivative by tangent

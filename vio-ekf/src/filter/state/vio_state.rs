@@ -25,6 +25,8 @@ pub struct VioState {
     pub(crate) depth_prior: InverseDistance,
     /// Specific force by the accelerometer's reading; `None`, the identity, where it is not estimated.
     pub(crate) accel_matrix: Option<Matrix3<f64>>,
+    /// Time from the exposure of a row of the first camera until that of the row below; known where `lens` is not there.
+    pub(crate) row_time: f64,
     /// Rate by what the gyroscope reads, axis by axis; used where `lens` is there, and one everywhere else.
     pub(crate) gyro_scale: Vector3<f64>,
     /// The first camera, where its intrinsics are estimated.
@@ -121,6 +123,7 @@ impl VioState {
         }
         if let Some(lens) = &mut self.lens {
             *lens = lens.with_intrinsics_changed(&intrinsics(delta, error_state::INTRINSICS));
+            self.row_time += delta[error_state::ROW_TIME];
             self.gyro_scale += block(delta, error_state::GYRO_SCALE);
         }
         if let Some(second) = &mut self.second {
@@ -141,6 +144,7 @@ impl VioState {
             time_offset: 0.0,
             depth_prior: InverseDistance::new(1.0),
             accel_matrix: None,
+            row_time: 0.0,
             gyro_scale: Vector3::repeat(1.0),
             lens: None,
             second: None,

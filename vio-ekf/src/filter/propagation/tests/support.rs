@@ -33,6 +33,7 @@ pub(super) fn state(rng: &mut Rng, landmarks: usize) -> VioState {
         time_offset: 0.01,
         depth_prior: InverseDistance::new(0.3),
         accel_matrix: None,
+        row_time: 0.0,
         gyro_scale: Vector3::repeat(1.0),
         lens: None,
         second: None,
@@ -94,6 +95,7 @@ pub(super) fn difference(a: &VioState, b: &VioState) -> DVector<f64> {
     d.rows_mut(error_state::ACCEL_MATRIX, error_state::MATRIX_SIZE).copy_from_slice(matrix.as_slice());
     if let (Some(lens), Some(other)) = (&a.lens, &b.lens) {
         d.rows_mut(error_state::INTRINSICS, INTRINSICS).copy_from_slice(&lens.intrinsics_less(other));
+        d[error_state::ROW_TIME] = a.row_time - b.row_time;
         d.fixed_rows_mut::<3>(error_state::GYRO_SCALE).copy_from(&(a.gyro_scale - b.gyro_scale));
     }
     let head = a.head();
