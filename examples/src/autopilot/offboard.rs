@@ -30,6 +30,10 @@ impl Default for OffboardSettings {
     }
 }
 
+/// All streams are asked for within this time, s, first and then.
+const FIRST_RATES: f64 = 0.2;
+const ALL_RATES: f64 = 2.0;
+
 /// The state of the link.
 #[derive(Debug, Clone)]
 pub struct OffboardLink {
@@ -41,6 +45,8 @@ pub struct OffboardLink {
     setpoints: Pace,
     odometry: Pace,
     rates: Pace,
+    /// Streams that it has been asked for, again and again.
+    asked: usize,
     replies: Vec<MavMessage>,
 }
 
@@ -76,7 +82,8 @@ impl OffboardLink {
             heartbeats: Pace::every(1.0),
             setpoints: Pace::every(1.0 / settings.setpoint_rate),
             odometry: Pace::every(1.0 / settings.odometry_rate),
-            rates: Pace::every(2.0),
+            rates: Pace::every(ALL_RATES),
+            asked: 0,
             replies: Vec::new(),
             settings,
         }
@@ -117,9 +124,14 @@ impl OffboardLink {
         if let Some(setpoint) = setpoint.filter(|_| self.setpoints.due(now)) {
             messages.push(setpoint.message(now, &autopilot));
         }
+        // Asked again and again: an autopilot that was restarted has forgotten it. One at a time: it obeys one command in each of its
+        // cycles, and its pilot's must not wait behind ours.
+        let wanted = self.wanted_rates(&autopilot);
+        let all = if self.asked < wanted.len() { FIRST_RATES } else { ALL_RATES };
+        self.rates.interval = all / wanted.len() as f64;
         if self.rates.due(now) {
-            // Asked again and again: an autopilot that was restarted has forgotten it.
-            messages.extend(self.wanted_rates(&autopilot));
+            messages.push(wanted[self.asked % wanted.len()].clone());
+            self.asked += 1;
         }
         if let Some(request) = self.request.filter(|_| self.requested.due(now)) {
             messages.extend(self.commands(request));
@@ -127,7 +139,7 @@ impl OffboardLink {
         messages
     }
 
-    fn wanted_rates(&self, autopilot: &Identity) -> Vec<MavMessage> {
+    fn wanted_rates(&self, autopilot: &Identity) -> [MavMessage; 6] {
         let fast = self.settings.telemetry_rate;
         let wanted = [
             (mavlink::dialects::common::ATTITUDE_QUATERNION_DATA::ID, fast),
@@ -140,7 +152,7 @@ impl OffboardLink {
         let ask = |(id, rate): (u32, f64)| {
             command(autopilot, MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, [id as f32, (1e6 / rate) as f32, 0.0])
         };
-        wanted.into_iter().map(ask).collect()
+        wanted.map(ask)
     }
 
     /// The commands that are missing for a request; none while no autopilot is heard.
@@ -185,6 +197,8 @@ fn command(to: &Identity, command: MavCmd, [param1, param2, param3]: [f32; 3]) -
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     fn heard(custom_mode: u32, base_mode: MavModeFlag) -> (MavHeader, MavMessage) {
@@ -235,6 +249,27 @@ mod tests {
         assert_eq!(commands(&link.transmit(1.01, Some(&setpoint), None)), []);
         link.request(Some(Request::Land));
         assert_eq!(commands(&link.transmit(1.02, Some(&setpoint), None)), [(176, 4.0, 3)]);
+    }
+
+    /// Its pilot's command waits behind one of ours at most, and a stream that it forgot comes back within two seconds.
+    #[test]
+    fn streams_are_asked_for_one_at_a_time_soon_at_first_and_again() {
+        let mut link = OffboardLink::new(OffboardSettings::default());
+        let (header, message) = heard(0, MavModeFlag::empty());
+        link.receive(0.0, &header, &message);
+        let asked = (0..450).map(|step| {
+            let of = |m: &MavMessage| match m {
+                MavMessage::COMMAND_LONG(c) => Some(c.param1 as u32),
+                _ => None,
+            };
+            link.transmit(0.01 * f64::from(step), None, None).iter().filter_map(of).collect::<Vec<u32>>()
+        });
+        let asked: Vec<Vec<u32>> = asked.collect();
+        assert!(asked.iter().all(|ids| ids.len() <= 1));
+        let within = |steps: std::ops::Range<usize>| asked[steps].concat().into_iter().collect::<BTreeSet<u32>>().len();
+        assert_eq!((within(0..20), within(30..240), within(240..450)), (6, 6, 6));
+        let all = asked.concat().len();
+        assert!(all < 6 + 16, "{all}");
     }
 
     #[test]

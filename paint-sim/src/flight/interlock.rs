@@ -28,7 +28,7 @@ impl Default for Interlock {
 }
 
 /// Share of a spot that is left for what the prediction errs between a decision and its effect (ours).
-const PREDICTED: f64 = 0.2;
+const PREDICTED: f64 = 0.3;
 
 impl Interlock {
     /// So that no paint leaves more than a spot's deviation, m, beside its aim.
@@ -68,8 +68,17 @@ pub struct InterlockState {
     /// Control steps from a command of the joints to its effect, and from one of the valve.
     delays: [usize; 2],
     commands: Vec<[f64; 2]>,
+    /// What the joints have reported.
+    angles: Vec<[f64; 2]>,
+    /// Whether nothing spoke against paint in the last control step: a valve that was shut is not opened for a single one.
+    permitted: bool,
     open: Vec<bool>,
 }
+
+/// A joint sticks that within so many control steps is told to move by this angle, rad, and moves by less than this share of it (ours).
+const STUCK_STEPS: usize = 3;
+const STUCK_TOLD: f64 = 1e-3;
+const STUCK_SHARE: f64 = 0.1;
 
 /// What is known when a control step begins.
 #[derive(Clone, Copy)]
@@ -92,27 +101,38 @@ impl InterlockState {
     /// `None` leaves the valve to the reference. Delays of joints and valve in control steps.
     pub fn new(settings: Option<Interlock>, delays: [f64; 2]) -> Self {
         let delays = delays.map(|steps| steps.round() as usize);
-        Self { settings, delays, commands: Vec::new(), open: Vec::new() }
+        Self { settings, delays, commands: Vec::new(), angles: Vec::new(), permitted: false, open: Vec::new() }
     }
 
     /// Decides for the control step that begins: the spray must meet its aim now and when the valve will have followed; without a
-    /// pose the valve is shut. The joints will then be where they were commanded to, but for what they are off now.
+    /// pose the valve is shut. The joints will then be where they were commanded to, but for what they are off now; one that sticks will be where it is.
     pub fn decide(&mut self, ptu: &dyn PanTilt, known: &InterlockInput) {
         self.commands.push(known.command);
         let [joints, valve] = self.delays;
         let commanded = |ago: usize| self.commands[self.commands.len().saturating_sub(1 + ago)];
         let (now, later) = (commanded(joints), commanded(joints.saturating_sub(valve)));
-        let expected = [0, 1].map(|k| later[k] + known.angles[k] - now[k]);
+        self.angles.push(known.angles);
+        let before = commanded(joints + STUCK_STEPS);
+        let way = &self.angles[self.angles.len().saturating_sub(1 + STUCK_STEPS)..];
+        let sticks = |k: usize| {
+            let told = (now[k] - before[k]).abs();
+            // There and back is moved, too.
+            let moved: f64 = way.windows(2).map(|pair| (pair[1][k] - pair[0][k]).abs()).sum();
+            told > STUCK_TOLD && moved < STUCK_SHARE * told
+        };
+        let expected = [0, 1].map(|k| if sticks(k) { known.angles[k] } else { later[k] + known.angles[k] - now[k] });
         let permits = |interlock: &Interlock, estimator: &Estimator| {
             estimator.innovation() <= UNSETTLED * interlock.miss
                 && interlock.permits(ptu, &estimator.predict(0.0), known.angles, known.now)
                 && interlock.permits(ptu, &estimator.predict(known.ahead), expected, known.later)
         };
-        self.open.push(match (&self.settings, known.estimator) {
+        let permitted = match (&self.settings, known.estimator) {
             (None, _) => true,
             (Some(_), None) => false,
             (Some(interlock), Some(estimator)) => permits(interlock, estimator),
-        });
+        };
+        self.open.push(permitted && (self.permitted || self.last()));
+        self.permitted = permitted;
     }
 
     /// The decision of the last control step; before the first nothing is forbidden.
