@@ -26,13 +26,16 @@ const STRONGEST: f64 = 2.0;
 const CONTROLLER: ControllerSettings =
     ControllerSettings { position: 4.0, velocity: 3.5, attitude: 6.0, heading: 3.0, lever_rate: 1.0, jerk_window: 0.1 };
 
+/// Pole of the attitude, rad/s: such an autopilot turns as no model of first order expects, and its attitude is known to a milliradian.
+const ATTITUDE_POLE: f64 = 60.0;
+
 /// The observer's poles: inside our own position loop as slow as that loop needs it, beside the autopilot's as fast as the aim wants it.
 fn observer(setpoints: SetpointKind) -> ObserverSettings {
     let translation = match setpoints {
         SetpointKind::Attitude => 6.0,
         SetpointKind::Trajectory => 16.0,
     };
-    ObserverSettings { translation, ..ObserverSettings::default() }
+    ObserverSettings { translation, attitude: ATTITUDE_POLE }
 }
 
 /// Which set-points the autopilot is given.
@@ -307,5 +310,29 @@ fn odometry(pose: &LocalisedPose, resets: u8) -> Odometry {
         velocity_covariance: Matrix3::zeros(),
         north: true,
         resets,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, UnitQuaternion};
+
+    use super::*;
+
+    /// An error of the model's roll decays at its own rate and the observer's pole: of 0.1 rad at 7 rad/s |7j + 5.4| / |7j + 5.4 + 60| is left.
+    #[test]
+    fn a_vehicle_that_turns_as_the_model_does_not_is_followed() {
+        let turned = |time: f64| Isometry3::rotation(Vector3::x() * 0.1 * (7.0 * time).sin());
+        for setpoints in [SetpointKind::Attitude, SetpointKind::Trajectory] {
+            let mut estimator = Estimator::new(Airframe::default(), observer(setpoints), &turned(0.0));
+            let mut worst = 0.0_f64;
+            for step in 1..300 {
+                let pose = turned(f64::from(step) * CONTROL_STEP);
+                estimator.update(&pose, CONTROL_STEP);
+                let [roll, pitch, yaw] = estimator.estimate().attitude;
+                worst = worst.max(UnitQuaternion::from_euler_angles(roll, pitch, yaw).angle_to(&pose.rotation));
+            }
+            assert!((0.005..0.02).contains(&worst), "{setpoints:?}: {worst}");
+        }
     }
 }
