@@ -26,7 +26,7 @@ const STRONGEST: f64 = 2.0;
 const CONTROLLER: ControllerSettings =
     ControllerSettings { position: 4.0, velocity: 3.5, attitude: 6.0, heading: 3.0, lever_rate: 1.0, jerk_window: 0.1 };
 
-/// Pole of the attitude, rad/s: such an autopilot turns as no model of first order expects, and its attitude is known to a milliradian.
+/// Pole of the attitude, rad/s: such an autopilot turns as no model of first order expects, and what is measured errs less than the model.
 const ATTITUDE_POLE: f64 = 60.0;
 
 /// The observer's poles: inside our own position loop as slow as that loop needs it, beside the autopilot's as fast as the aim wants it.
@@ -319,7 +319,8 @@ mod tests {
 
     use super::*;
 
-    /// An error of the model's roll decays at its own rate and the observer's pole: of 0.1 rad at 7 rad/s |7j + 5.4| / |7j + 5.4 + 60| is left.
+    /// An error of the model's roll decays at its own rate and the observer's pole: of 0.1 rad at 7 rad/s |7j + 5.4| / |7j + 5.4 + 60|,
+    /// 13 mrad, is left.
     #[test]
     fn a_vehicle_that_turns_as_the_model_does_not_is_followed() {
         let turned = |time: f64| Isometry3::rotation(Vector3::x() * 0.1 * (7.0 * time).sin());

@@ -105,7 +105,8 @@ impl InterlockState {
     }
 
     /// Decides for the control step that begins: the spray must meet its aim now and when the valve will have followed; without a
-    /// pose the valve is shut. The joints will then be where they were commanded to, but for what they are off now; one that sticks will be where it is.
+    /// pose the valve is shut. The joints will then be where they were commanded to, but for what they are off now; one that sticks
+    /// will be where it is.
     pub fn decide(&mut self, ptu: &dyn PanTilt, known: &InterlockInput) {
         self.commands.push(known.command);
         let [joints, valve] = self.delays;
