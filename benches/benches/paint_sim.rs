@@ -9,10 +9,11 @@ use nalgebra::{Point3, Vector3};
 use paint_planner::{OptimalPlanner, Planner};
 use paint_sim::colour::ciede2000;
 use paint_sim::colour::{BANDS, Spectrum, spectrum_srgb8};
+use paint_sim::film::wet::{Ground, Side, WetFilm, WetPaint};
 use paint_sim::flight::{Reference, ReferenceState};
 use paint_sim::render::{Lights, Shading};
 use paint_sim::surface::Hit;
-use paint_sim::{Camera, Film, FlightSettings, Shot, SprayModel, fly, render};
+use paint_sim::{Camera, Film, FlightSettings, Shot, SprayModel, Texel, TriangleSurface, fly, render};
 use paintcopter::adapters::{MeshSurface, PlanReference, Robot, ServoPanTilt};
 use paintcopter::mission::MissionSettings;
 use paintcopter::surface::PaintSurface;
@@ -38,6 +39,7 @@ fn main() -> Result<(), AnyError> {
     films(&mut group)?;
     colours(&mut group);
     deposit(&mut group, &surface)?;
+    wet(&mut group)?;
     flight(&mut group, &surface)?;
     picture(&mut group, &surface)?;
     group.finish();
@@ -51,6 +53,11 @@ fn films(group: &mut Group) -> Result<(), AnyError> {
     let mut narrow = vec![[0.0_f32; BANDS]; FILMS];
     group.throughput(Throughput::Elements((FILMS * BANDS) as u64));
     group.bench_function("Kubelka-Munk f32, 1e6 films x 36 bands", |b| b.iter(|| films.narrow(black_box(&mut narrow))));
+    let mut colours = vec![[0_u8; 3]; FILMS];
+    films.srgb8(&mut colours)?;
+    group.bench_function("Kubelka-Munk to sRGB, 1e6 films x 36 bands", |b| {
+        b.iter(|| films.srgb8(black_box(&mut colours)));
+    });
     let mut wide: Vec<Spectrum> = vec![[0.0; BANDS]; FEWER];
     group.throughput(Throughput::Elements((FEWER * BANDS) as u64));
     group.bench_function("Kubelka-Munk f64, 1e5 films x 36 bands", |b| b.iter(|| films.wide(black_box(&mut wide))));
@@ -85,6 +92,45 @@ fn deposit(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
     group.bench_function(format!("deposit on {} texels", film.texels().len()), |b| {
         b.iter(|| film.deposit(&shots, &spray, &surface.world, 1, &mut |_, _| ()));
     });
+    Ok(())
+}
+
+/// A second of a million texels of a steep wall, wet everywhere and running.
+fn wet(group: &mut Group) -> Result<(), AnyError> {
+    const SIDE: u32 = 1000;
+    const EDGE: f64 = 2e-3;
+    let texel = |row: u32, column: u32| Texel {
+        // Not quite along the grid: paint runs over two sides.
+        point: Point3::new(0.0, EDGE * f64::from(column), -EDGE * (f64::from(row) + 0.1 * f64::from(column))),
+        normal: -Vector3::x_axis(),
+        area: EDGE * EDGE,
+    };
+    let places = || (0..SIDE).flat_map(|row| (0..SIDE).map(move |column| (row, column)));
+    let side = |row: u32, column: u32| (row < SIDE && column < SIDE).then(|| SIDE * row + column);
+    let beyond = |(row, column): (u32, u32)| {
+        let around =
+            [(row + 1, column), (row.wrapping_sub(1), column), (row, column + 1), (row, column.wrapping_sub(1))];
+        around.map(|(beside, along)| Side { texel: SIDE * row + column, beyond: side(beside, along) })
+    };
+    let sides: Vec<Side> = places().flat_map(beyond).collect();
+    let film = Film::new(places().map(|(row, column)| texel(row, column)).collect())?;
+    // So viscous that it is as thick after all of the bench.
+    let paint = WetPaint { yield_stress: 1.0, viscosity: 500.0, ..WetPaint::default() };
+    let mut film = WetFilm::new(film, &sides, paint, Ground::default())?;
+    let far = TriangleSurface::new(&[[1.0, -9.0, -9.0], [1.0, 9.0, -9.0], [1.0, 0.0, 9.0]], &[[0, 2, 1]])?;
+    let step = 0.05;
+    let shot = |row: i32, column: i32| Shot {
+        origin: Point3::new(-0.2, step * f64::from(column), -step * f64::from(row)),
+        axis: Vector3::x_axis(),
+        volume: step * step * 150e-6 * paint.solids,
+    };
+    let shots: Vec<Shot> = (-3..48).flat_map(|row| (-3..44).map(move |column| shot(row, column))).collect();
+    film.deposit(&shots, &SprayModel::default(), &far, 1, &mut |_, _| ())?;
+    group.throughput(Throughput::Elements(u64::from(SIDE * SIDE)));
+    group.bench_function("wet step, 1e6 texels that run", |b| b.iter(|| film.step(1.0)));
+    if film.share_ran() < 0.9 {
+        return Err(format!("only {:.2} of the film runs", film.share_ran()).into());
+    }
     Ok(())
 }
 

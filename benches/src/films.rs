@@ -1,6 +1,7 @@
 //! Paint films of many thicknesses over 36 bands, in single and double precision.
 
 use paint_sim::colour::{BANDS, Spectrum};
+use paint_sim::paint::FilmColours;
 use paint_sim::{Error, Paint, Substrate, km};
 
 use crate::Rng;
@@ -13,6 +14,7 @@ pub struct Films {
     paint: Paint,
     ground: Substrate,
     thickness: Vec<f64>,
+    narrow_thickness: Vec<f32>,
 }
 
 impl Films {
@@ -22,8 +24,9 @@ impl Films {
     /// None that this paint is known to give; it is checked.
     pub fn new(count: usize) -> Result<Self, Error> {
         let mut rng = Rng::new(2);
-        let thickness = (0..count).map(|_| rng.between(0.0, THICKEST)).collect();
-        Ok(Self { paint: Paint::yellow(20e-6)?, ground: Substrate::grey(0.5)?, thickness })
+        let thickness: Vec<f64> = (0..count).map(|_| rng.between(0.0, THICKEST)).collect();
+        let narrow_thickness = thickness.iter().map(|&depth| depth as f32).collect();
+        Ok(Self { paint: Paint::yellow(20e-6)?, ground: Substrate::grey(0.5)?, thickness, narrow_thickness })
     }
 
     /// Reflectance of every film in single precision.
@@ -34,6 +37,14 @@ impl Films {
         for (film, &depth) in reflectance.iter_mut().zip(&self.thickness) {
             *film = std::array::from_fn(|j| km::reflectance_f32(k[j], s[j], depth as f32, ground[j]));
         }
+    }
+
+    /// Colour of every film for the screen, all bands of it.
+    ///
+    /// # Errors
+    /// Not as many colours as films.
+    pub fn srgb8(&self, colours: &mut [[u8; 3]]) -> Result<(), Error> {
+        FilmColours::new(&self.paint, &self.ground).srgb8(&self.narrow_thickness, colours)
     }
 
     /// Reflectance of every film in double precision.

@@ -8,6 +8,7 @@ mod upsampling;
 
 pub use ciede2000::ciede2000;
 pub use spectrum::{BANDS, Spectrum, wavelength};
+pub(crate) use srgb::Srgb8Table;
 pub use srgb::{decode_srgb, decode_srgb8, encode_srgb, encode_srgb8};
 pub use upsampling::spectrum_of_linear_srgb;
 
@@ -62,6 +63,11 @@ pub fn linear_srgb(xyz: [f64; 3]) -> [f64; 3] {
 pub fn spectrum_linear_srgb(reflectance: &Spectrum) -> [f64; 3] {
     let (values, white) = (xyz(reflectance), band_white());
     linear_srgb(std::array::from_fn(|i| values[i] / white[i] * WHITE[i]))
+}
+
+/// What a reflectance of 1 in one band alone adds to [`spectrum_linear_srgb`], band by band.
+pub(crate) fn linear_srgb_weights() -> [[f64; 3]; BANDS] {
+    std::array::from_fn(|band| spectrum_linear_srgb(&std::array::from_fn(|other| f64::from(u8::from(other == band)))))
 }
 
 /// CIELAB against [`WHITE`] of linear sRGB (IEC 61966-2-1).

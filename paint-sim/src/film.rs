@@ -13,6 +13,7 @@ pub mod inspection;
 mod mass_balance;
 mod texel;
 mod texel_index;
+pub mod wet;
 
 pub use mass_balance::MassBalance;
 pub use texel::Texel;
@@ -126,6 +127,19 @@ impl Film {
         touched: &mut dyn FnMut(u32),
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<MassBalance, Error> {
+        self.deposit_told(shots, spray, surface, threads, &mut |texel, _| touched(texel), progress)
+    }
+
+    /// The same, and tells `landed` how much comes onto which texel.
+    fn deposit_told(
+        &mut self,
+        shots: &[Shot],
+        spray: &SprayModel,
+        surface: &dyn Surface,
+        threads: usize,
+        landed: &mut dyn FnMut(u32, u64),
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<MassBalance, Error> {
         span!("deposit");
         let emitted = check_call(shots, spray, threads)?;
         self.mass_balance.emitted.checked_add(emitted).ok_or(Error::MassOverflow)?;
@@ -135,11 +149,11 @@ impl Film {
             for (texel, quanta) in deposit_batch(&self.index, batch, spray, surface, threads) {
                 self.volumes[texel as usize] += quanta;
                 deposited += quanta;
-                touched(texel);
+                landed(texel, quanta);
             }
             progress(number * SHOTS_PER_BATCH + batch.len(), shots.len());
         }
-        let call = MassBalance { emitted, deposited, overspray: emitted - deposited };
+        let call = MassBalance { emitted, deposited, overspray: emitted - deposited, dripped: 0 };
         event!(debug, shots = shots.len(), emitted, deposited, overspray = call.overspray, "deposited");
         self.mass_balance.emitted += call.emitted;
         self.mass_balance.deposited += call.deposited;
@@ -178,6 +192,7 @@ impl Film {
             emitted: left(balance.emitted, emitted)?,
             deposited: left(balance.deposited, deposited)?,
             overspray: left(balance.overspray, emitted - deposited)?,
+            dripped: balance.dripped,
         };
         self.volumes = volumes;
         hits.into_iter().for_each(touched);

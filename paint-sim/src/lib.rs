@@ -45,6 +45,9 @@
 //! | Riccati's equation, film by film (ours) | colour of a stack of films and its derivatives | [`paint::FilmStack`] |
 //! | Jakob and Hanika 2019 | reflectance of a colour | [`colour::spectrum_of_linear_srgb`] |
 //! | pictures before and after (ours) | fall-off of the lens, light of the scene, thickness of the film | [`film::inspection`] |
+//! | Bingham 1922, Huppert 1982 | paint that runs on a wall | [`film::wet`] |
+//! | Maron and Pierce 1956, Washburn 1921 | paint that dries, ground that soaks it up | [`film::wet`] |
+//! | Kubelka 1948, its tangent written out (ours) | colours of a million films | [`paint::FilmColours`] |
 //! | a paint by name on a substrate, by thickness (ours) | table of colours, curve of ink | [`paint::Appearance`], [`paint::ink_curve`] |
 //! | Duncan 1940 | wet mixture `K = sum c K`, `S = sum c S` | [`Paint::mix`] |
 //! | Saunderson 1942 | the air above the paint | [`km::saunderson`] |

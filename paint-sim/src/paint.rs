@@ -2,12 +2,14 @@
 
 mod appearance;
 mod drawdown;
+mod film_colours;
 mod film_stack;
 mod named;
 mod pigments;
 
 pub use appearance::{Appearance, ink_curve};
 pub use drawdown::Drawdown;
+pub use film_colours::FilmColours;
 pub use film_stack::{Bands, FilmStack, MOST_FILMS};
 pub use named::PaintName;
 pub use pigments::{PIGMENTS, Pigment};

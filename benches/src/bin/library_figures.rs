@@ -321,6 +321,9 @@ fn sim(count: usize, runs: usize) -> Result<(), AnyError> {
     let mut narrow = vec![[0.0; BANDS]; count];
     print("km_f32_x36", median_seconds(runs, || films.narrow(black_box(&mut narrow))));
     let mut wide = vec![[0.0; BANDS]; count];
+    let mut colours = vec![[0; 3]; count];
+    films.srgb8(&mut colours)?;
+    print("km_srgb8_x36", median_seconds(runs, || films.srgb8(black_box(&mut colours))));
     print("km_f64_x36", median_seconds(runs, || films.wide(black_box(&mut wide))));
 
     let mut rng = Rng::new(4);

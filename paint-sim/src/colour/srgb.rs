@@ -24,6 +24,33 @@ pub fn decode_srgb8(encoded: u8) -> f64 {
     decode_srgb(f64::from(encoded) / 255.0)
 }
 
+/// [`encode_srgb8`] in single precision, without a branch on the data.
+pub(crate) struct Srgb8Table {
+    /// Least number with a code of at least so much; beyond the last none.
+    least: [f32; 257],
+    start: [u8; Srgb8Steps::PARTS + 1],
+}
+
+impl Srgb8Table {
+    pub(crate) fn get() -> &'static Self {
+        static TABLE: LazyLock<Srgb8Table> = LazyLock::new(|| {
+            let steps = Srgb8Steps::new();
+            let least = std::array::from_fn(|code| steps.least.get(code).map_or(f32::INFINITY, |&least| least as f32));
+            Srgb8Table { least, start: steps.start }
+        });
+        &TABLE
+    }
+
+    /// The byte of a linear component, clipped.
+    pub(crate) fn encode(&self, linear: f32) -> u8 {
+        let linear = linear.clamp(0.0, 1.0);
+        let start = self.start[(linear * Srgb8Steps::PARTS as f32) as usize];
+        let next = usize::from(start) + 1;
+        // At most two codes step within a part; the one after the last is never reached.
+        start + u8::from(linear >= self.least[next]) + u8::from(linear >= self.least[(next + 1).min(256)])
+    }
+}
+
 /// Where the rounded curve steps: a picture asks for it once per channel of each pixel, and a power costs more than a look.
 struct Srgb8Steps {
     /// Least number from 0 to 1 with a code of at least so much.

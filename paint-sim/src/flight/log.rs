@@ -20,6 +20,11 @@ impl FlightLog {
     /// open, from the mean pose of its samples weighted by their flow. A step well below the size of the spot changes nothing
     /// that can be seen; zero gives one shot per sample.
     pub fn shots(&self, step: f64) -> Vec<Shot> {
+        self.timed_shots(step).into_iter().map(|(_, shot)| shot).collect()
+    }
+
+    /// The same with the time of each shot's first sample, s.
+    pub fn timed_shots(&self, step: f64) -> Vec<(f64, Shot)> {
         let mut shots = Vec::new();
         let mut accumulated = ShotAccumulator::default();
         for sample in &self.samples {
@@ -62,9 +67,10 @@ impl<'a> ShotAccumulator<'a> {
         self.axis += volume * sample.axis.into_inner();
     }
 
-    fn shot(&self) -> Option<Shot> {
+    fn shot(&self) -> Option<(f64, Shot)> {
         let first = self.first?;
         let axis = UnitVector3::try_new(self.axis, 1e-300).unwrap_or(first.axis);
-        Some(Shot { origin: Point3::from(self.nozzle / self.volume), axis, volume: self.volume })
+        let shot = Shot { origin: Point3::from(self.nozzle / self.volume), axis, volume: self.volume };
+        Some((first.time, shot))
     }
 }

@@ -195,7 +195,10 @@ fn texels_cannot_claim_more_than_was_sprayed() {
     let mut film = Film::new(texels).unwrap();
     let model = SprayModel { efficiency: 0.6, ..SprayModel::default() };
     let balance = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &model, &far_plate(), 1);
-    assert_eq!(balance, MassBalance { emitted: 1_000_000_000, deposited: 600_000_000, overspray: 400_000_000 });
+    assert_eq!(
+        balance,
+        MassBalance { emitted: 1_000_000_000, deposited: 600_000_000, overspray: 400_000_000, dripped: 0 }
+    );
 }
 
 #[test]

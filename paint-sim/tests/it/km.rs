@@ -191,3 +191,45 @@ fn the_gradient_has_no_step_where_its_series_ends() {
     assert_close(below.absorption, above.absorption, 3e-11);
     assert_close(below.scattering, above.scattering, 3e-11);
 }
+
+/// Colours of many films at once are those of each by itself, in double precision; also of paints that hardly absorb or scatter.
+#[test]
+fn many_films_have_the_colours_of_each() {
+    use paint_sim::colour::{spectrum_linear_srgb, spectrum_srgb8};
+    use paint_sim::paint::{FilmColours, PIGMENTS};
+    use paint_sim::{Paint, Substrate};
+
+    let film = 20e-6;
+    let clear = Paint::new(&[0.0; 36], &[1e-9; 36], film).unwrap();
+    let scatters = Paint::new(&[0.0; 36], &[3.0; 36], film).unwrap();
+    let absorbs = Paint::new(&[3.0; 36], &[0.0; 36], film).unwrap();
+    let pigments = PIGMENTS.iter().map(|pigment| pigment.paint(film).unwrap());
+    // From a ten-thousandth of a film to fifty, and an odd number of them.
+    let thickness: Vec<f32> = (0..301).map(|k| 20e-6 * 10.0_f32.powf(-4.0 + 5.7 * k as f32 / 300.0)).collect();
+    let (mut worst, mut bytes) = (0.0_f64, 0);
+    for paint in pigments.chain([clear, scatters, absorbs]) {
+        for ground in [0.0, 0.3, 1.0] {
+            let ground = Substrate::grey(ground).unwrap();
+            let films = FilmColours::new(&paint, &ground);
+            let (mut linear, mut coded) = (vec![[0.0; 3]; thickness.len()], vec![[0; 3]; thickness.len()]);
+            films.linear_srgb(&thickness, &mut linear).unwrap();
+            films.srgb8(&thickness, &mut coded).unwrap();
+            for ((&thickness, linear), coded) in thickness.iter().zip(&linear).zip(&coded) {
+                let alone = paint.over(f64::from(thickness), &ground).unwrap();
+                let closed = spectrum_linear_srgb(alone.reflectance());
+                for c in 0..3 {
+                    worst = worst.max((f64::from(linear[c]) - closed[c]).abs());
+                    bytes = bytes.max(coded[c].abs_diff(spectrum_srgb8(alone.reflectance()).rgb[c]));
+                }
+            }
+        }
+    }
+    assert!(worst < 3e-6, "{worst}");
+    assert!(bytes <= 1, "{bytes}");
+    let films = FilmColours::new(&scatters, &Substrate::grey(0.3).unwrap());
+    let (mut odd, mut bare) = ([[0.0; 3]; 2], [[0.0; 3]; 1]);
+    films.linear_srgb(&[f32::NAN, -1.0], &mut odd).unwrap();
+    films.linear_srgb(&[0.0], &mut bare).unwrap();
+    assert_eq!(odd, [bare[0]; 2]);
+    assert!(films.linear_srgb(&[0.0], &mut odd).unwrap_err().to_string().contains("colours"));
+}

@@ -19,3 +19,4 @@ mod own_reference;
 mod own_surface;
 mod render;
 mod surface;
+mod wet;

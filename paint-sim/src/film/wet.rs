@@ -1,0 +1,173 @@
+//! Paint before it is dry: it runs on steep walls, soaks into the ground, and loses its solvent.
+//!
+//! A thin film on a wall that is steeper than flat is sheared by its own weight. Where it is thicker than its yield stress carries it flows
+//! downhill as a Bingham fluid; what it loses of its solvent makes it stiffer until it is dry to touch. Everything is counted in whole
+//! femtolitres, so nothing is lost or invented however long it runs.
+
+mod descents;
+mod flow;
+mod ground;
+mod liquid_balance;
+mod wet_paint;
+
+pub use descents::Side;
+pub use flow::Flow;
+pub use ground::Ground;
+pub use liquid_balance::LiquidBalance;
+pub use wet_paint::WetPaint;
+
+use descents::Descents;
+
+use super::{Film, MassBalance};
+use crate::error::{Error, check_not_negative};
+use crate::spray::{QUANTUM, Shot, SprayModel};
+use crate::surface::Surface;
+use crate::trace::span;
+
+/// Longest time over which stiffness is taken to be constant, s.
+const LONGEST_STEP: f64 = 5.0;
+
+/// A [`Film`] whose paint is wet where it was sprayed last.
+///
+/// The film's own volumes are those of the paint that stays (its solids); the solvent is counted beside them. Paint that is dry to touch
+/// is part of the wall for what is sprayed onto it later.
+#[derive(Debug, Clone)]
+pub struct WetFilm {
+    film: Film,
+    paint: WetPaint,
+    ground: Ground,
+    descents: Descents,
+    /// Solids that are dry to touch, per texel.
+    dry: Vec<u64>,
+    solvent: Vec<u64>,
+    /// Liquid in the pores of the ground.
+    soaked: Vec<u64>,
+    ran: Vec<bool>,
+    balance: LiquidBalance,
+    /// The largest rate of a wave over a texel, 1/s, where nothing has come since.
+    fastest: Option<f64>,
+}
+
+impl WetFilm {
+    /// `film` with nothing wet on it: what it holds is dry. `sides` are the sides of its texels; between texels that have none nothing runs.
+    ///
+    /// # Errors
+    /// A paint or ground out of range, a side that names no texel.
+    pub fn new(film: Film, sides: &[Side], paint: WetPaint, ground: Ground) -> Result<Self, Error> {
+        paint.check()?;
+        ground.check()?;
+        let descents = Descents::new(film.texels(), sides, &paint)?;
+        let count = film.texels().len();
+        let dry = film.volumes.clone();
+        Ok(Self {
+            film,
+            paint,
+            ground,
+            descents,
+            dry,
+            solvent: vec![0; count],
+            soaked: vec![0; count],
+            ran: vec![false; count],
+            balance: LiquidBalance::default(),
+            fastest: Some(0.0),
+        })
+    }
+
+    /// Sprays `shots`, whose volumes are solids as everywhere, with the solvent of the can; see [`Film::deposit`].
+    ///
+    /// # Errors
+    /// As [`Film::deposit`]; the film is then unchanged.
+    pub fn deposit(
+        &mut self,
+        shots: &[Shot],
+        spray: &SprayModel,
+        surface: &dyn Surface,
+        threads: usize,
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<MassBalance, Error> {
+        self.fastest = None;
+        let Self { film, paint, solvent, balance, .. } = self;
+        let landed = &mut |texel: u32, solids: u64| {
+            let with = paint.solvent_of(solids);
+            solvent[texel as usize] += with;
+            balance.landed += with;
+        };
+        film.deposit_told(shots, spray, surface, threads, landed, progress)
+    }
+
+    /// Lets `seconds` pass.
+    ///
+    /// # Errors
+    /// A time that is negative or not finite.
+    pub fn step(&mut self, seconds: f64) -> Result<Flow, Error> {
+        span!("wet_step");
+        check_not_negative("seconds", seconds)?;
+        let pieces = (seconds / LONGEST_STEP).ceil().max(1.0);
+        let mut flow = Flow::default();
+        for _ in 0..pieces as u64 {
+            if self.is_dry() {
+                break;
+            }
+            flow = flow.and(self.advance(seconds / pieces));
+        }
+        Ok(flow)
+    }
+
+    /// The film: thickness and volumes of the solids, wet and dry.
+    pub fn film(&self) -> &Film {
+        &self.film
+    }
+
+    /// The same with what was wet as if it were dry.
+    pub fn into_film(self) -> Film {
+        self.film
+    }
+
+    /// Thickness of what is wet on texel `index`, solids and solvent, m; zero where there is no such texel.
+    pub fn wet_thickness(&self, index: usize) -> f64 {
+        match (self.wet_solids(index), self.film.texels().get(index)) {
+            (Some(solids), Some(texel)) => (solids + self.solvent[index]) as f64 * QUANTUM / texel.area,
+            _ => 0.0,
+        }
+    }
+
+    /// Time in which all is dry to touch, s, at most (the ground makes it shorter); infinite where no solvent evaporates.
+    pub fn time_to_dry(&self) -> f64 {
+        let left =
+            |k: usize| self.solvent[k] as f64 - self.paint.solvent_left() * (self.film.volumes[k] - self.dry[k]) as f64;
+        let thickness = |k: usize| left(k) * QUANTUM / self.film.texels()[k].area;
+        let wet = (0..self.solvent.len()).filter(|&k| self.solvent[k] > 0).map(thickness).fold(0.0, f64::max);
+        if wet > 0.0 { wet / self.paint.evaporation } else { 0.0 }
+    }
+
+    /// Whether nothing is wet.
+    pub fn is_dry(&self) -> bool {
+        self.solvent.iter().all(|&solvent| solvent == 0)
+    }
+
+    /// Texels from which paint has run.
+    pub fn ran(&self) -> &[bool] {
+        &self.ran
+    }
+
+    /// Share by area of the painted texels from which paint has run; zero without paint.
+    pub fn share_ran(&self) -> f64 {
+        let (mut painted, mut ran) = (0.0, 0.0);
+        for ((texel, &volume), &runs) in self.film.texels().iter().zip(&self.film.volumes).zip(&self.ran) {
+            if volume > 0 || runs {
+                painted += texel.area;
+                ran += if runs { texel.area } else { 0.0 };
+            }
+        }
+        ran / f64::max(painted, f64::MIN_POSITIVE)
+    }
+
+    /// Where the solvent went; that of the solids is [`Film::mass_balance`].
+    pub fn liquid_balance(&self) -> LiquidBalance {
+        LiquidBalance { on_surface: self.solvent.iter().sum(), soaked: self.soaked.iter().sum(), ..self.balance }
+    }
+
+    fn wet_solids(&self, index: usize) -> Option<u64> {
+        Some(self.film.volumes.get(index)? - self.dry[index])
+    }
+}
