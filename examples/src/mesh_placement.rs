@@ -294,7 +294,8 @@ mod tests {
             faces: faces.to_vec(),
             ..TriangleMesh::default()
         };
-        let mut scene = Scene { canvas: part([[0, 1, 2], [0, 2, 3]]), obstacles: part([[4, 5, 6], [4, 6, 7]]) };
+        let mut scene =
+            Scene { canvas: part([[0, 1, 2], [0, 2, 3]]), obstacles: part([[4, 5, 6], [4, 6, 7]]), clean: Vec::new() };
         assert!((mean_normal(&scene.canvas) - Vector3::y()).norm() < 1e-6);
         place_scene(&mut scene, MeshPlacement { scale: Some(0.5), up: UpAxis::Z }).unwrap();
         // Half as large, facing -x with the file's x to the robot's left: the box around all is 4 m by 1 m by 3 m.

@@ -53,6 +53,9 @@ pub struct MissionArguments {
     /// place in metres then, unless --scale says otherwise
     #[arg(long, conflicts_with = "scan")]
     region: Option<Region>,
+    /// Keep a part clean, as a window in a house front: a region as of --region; may be given several times
+    #[arg(long, value_name = "REGION", conflicts_with = "scan")]
+    keep_clean: Vec<Region>,
     /// What to paint: mural (in colour, with --palette), strata, stripes, gradient, colours (of the mesh's vertices), materials (the pictures
     /// that the mesh file or its MTL names), or a PNG, JPEG or SVG file
     /// [default: on the rock wall the mural where `paintcopter` flies it, else strata; on a mesh materials where it has pictures, else stripes]
@@ -293,10 +296,14 @@ impl MissionArguments {
     fn apply_surface(&self, mission: &mut MissionFile) -> Result<(), AnyError> {
         if let Some(mesh) = &self.mesh {
             (mission.mesh, mission.scale, mission.up, mission.region) = (Some(mesh.clone()), None, None, None);
+            mission.keep_clean.clear();
         }
         mission.scale = self.scale.or(mission.scale);
         mission.up = self.up.or(mission.up);
         mission.region = self.region.clone().or(mission.region.take());
+        if !self.keep_clean.is_empty() {
+            mission.keep_clean.clone_from(&self.keep_clean);
+        }
         mission.scan |= self.scan;
         let given =
             [("--scale", self.scale.is_some()), ("--up", self.up.is_some()), ("--region", self.region.is_some())];

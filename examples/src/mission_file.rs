@@ -53,6 +53,9 @@ pub struct MissionFile {
     pub scan: bool,
     /// The part that is painted, in the coordinates of the mesh file; all of it without.
     pub region: Option<Region>,
+    /// Parts that stay clean, windows in a front, in the same coordinates.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub keep_clean: Vec<Region>,
     /// All numbers.
     pub settings: MissionSettings,
     /// The paints of a picture in colour: `cmyk`, `six`, `spot:N` or a file of paints; the design is separated for them.
@@ -222,6 +225,7 @@ impl MissionFile {
             palette: self.palette.map(|palette| palette.with_file(place)),
             available: self.available.map(place),
             region: self.region.map(|region| region.with_file(place)),
+            keep_clean: self.keep_clean.into_iter().map(|region| region.with_file(place)).collect(),
             paints: self.paints.into_iter().map(|paint| paint.with_files(place)).collect(),
             ..self
         }
@@ -277,7 +281,7 @@ impl MissionFile {
             let map = own_senses.then(|| self.survey(&scene, folder)).transpose()?;
             return Ok(Place { name, scene, truth: None, map });
         }
-        if self.region.is_some() {
+        if self.is_place() {
             return Err(MissionFileError::RegionBeforeScan);
         }
         let scan_flight = ScanFlight::fly(&scene.canvas, self.settings.seed, self.settings.threads)
@@ -368,17 +372,28 @@ impl MissionFile {
 
     /// The part of a mesh that is painted, and the rest.
     fn select(&self, name: &str, mesh: TriangleMesh, unit: f64) -> Result<Scene, MissionFileError> {
-        let Some(region) = &self.region else { return Ok(Scene::whole(mesh)) };
-        let all = mesh.faces.len();
-        let scene = region
-            .split(mesh, self.settings.texel / unit, unit)
-            .map_err(|source| MissionFileError::Region { path: name.to_owned(), source })?;
+        let wrong = |source| MissionFileError::Region { path: name.to_owned(), source };
+        let (all, finest) = (mesh.faces.len(), self.settings.texel / unit);
+        let mut scene = match &self.region {
+            Some(region) => region.split(mesh, finest, unit).map_err(wrong)?,
+            None => Scene::whole(mesh),
+        };
         scene.canvas.notes.iter().for_each(|note| say!("{name}: {note}"));
-        say!("{name}: {} of {all} faces lie in the region {region}", scene.canvas.faces.len());
+        if let Some(region) = &self.region {
+            say!("{name}: {} of {all} faces lie in the region {region}", scene.canvas.faces.len());
+        }
+        for region in &self.keep_clean {
+            scene.keep_clean(region, finest, unit).map_err(wrong)?;
+        }
         Ok(scene)
     }
 
-    /// Reads and places a mesh. With a region it is a place in metres, without it an object.
+    /// Whether parts of it are named by its coordinates: a mesh is a place in metres then, else an object.
+    fn is_place(&self) -> bool {
+        self.region.is_some() || !self.keep_clean.is_empty()
+    }
+
+    /// Reads and places a mesh.
     fn load(&self, path: &Path) -> Result<Scene, MissionFileError> {
         let mut mesh = read_mesh(path)?;
         let name = path.display().to_string();
@@ -386,10 +401,10 @@ impl MissionFile {
             return Err(MissionFileError::NoTextureCoordinates { path: name });
         }
         let (up, up_said) = up_of(&mesh, path, self.up);
-        let subject = if self.region.is_some() { Subject::Place } else { Subject::Object };
+        let subject = if self.is_place() { Subject::Place } else { Subject::Object };
         let (scale, scale_said) = scale_of(&mesh, self.scale, subject);
         let placement = MeshPlacement { scale: Some(scale), up };
-        let (scene, placed) = if self.region.is_some() {
+        let (scene, placed) = if self.is_place() {
             let unit = if scale.is_finite() && scale > 0.0 { scale } else { 1.0 };
             let mut scene = self.select(&name, mesh, unit)?;
             let placed = place_scene(&mut scene, placement);

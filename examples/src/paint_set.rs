@@ -4,10 +4,11 @@ use std::path::Path;
 
 use paint_sim::Paint;
 use paint_sim::colour::{BANDS, Spectrum};
+use paint_sim::film::wet::WetPaint;
 use paint_sim::paint::{Drawdown, PIGMENTS, PaintName};
 use serde::Deserialize;
 
-use crate::appearance::{DENSITY, UNIT_THICKNESS};
+use crate::appearance::UNIT_THICKNESS;
 
 /// A paint with its name and what a tank of it holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,10 +17,8 @@ pub struct NamedPaint {
     pub name: String,
     /// How it looks.
     pub paint: Paint,
-    /// Density as it is sprayed, kg/m³.
-    pub density: f64,
-    /// Share of the volume that stays when it is dry, in `(0, 1]`.
-    pub solids: f64,
+    /// What it is as long as it is wet.
+    pub liquid: WetPaint,
 }
 
 impl NamedPaint {
@@ -29,7 +28,7 @@ impl NamedPaint {
     /// None for the thickness that the programs use.
     pub fn built_in(name: PaintName) -> Result<Self, paint_sim::Error> {
         let paint = name.paint(UNIT_THICKNESS)?;
-        Ok(Self { name: name.as_str().to_owned(), paint, density: DENSITY, solids: 1.0 })
+        Ok(Self { name: name.as_str().to_owned(), paint, liquid: WetPaint::default() })
     }
 
     /// Its folder among the results, by its place in the order, from 1.
@@ -60,22 +59,15 @@ struct PaintEntry {
     over_white: Option<Vec<f64>>,
     #[serde(default = "ideal_card")]
     card: [f64; 2],
-    #[serde(default = "usual_density")]
-    density: f64,
-    #[serde(default = "all_solids")]
-    solids: f64,
+    /// What the usual paint has where nothing is said, see [`WetPaint`].
+    density: Option<f64>,
+    solids: Option<f64>,
+    viscosity: Option<f64>,
+    yield_stress: Option<f64>,
 }
 
 fn ideal_card() -> [f64; 2] {
     [0.0, 1.0]
-}
-
-fn usual_density() -> f64 {
-    DENSITY
-}
-
-fn all_solids() -> f64 {
-    1.0
 }
 
 /// What is wrong with a file of paints.
@@ -113,7 +105,7 @@ pub enum PaintSetError {
 pub fn artists_paints() -> Result<Vec<NamedPaint>, paint_sim::Error> {
     let named = |pigment: &paint_sim::paint::Pigment| {
         let paint = pigment.paint(UNIT_THICKNESS)?;
-        Ok(NamedPaint { name: pigment.name.to_owned(), paint, density: DENSITY, solids: 1.0 })
+        Ok(NamedPaint { name: pigment.name.to_owned(), paint, liquid: WetPaint::default() })
     };
     PIGMENTS.iter().map(named).collect()
 }
@@ -143,12 +135,7 @@ impl PaintEntry {
         if self.name.trim().is_empty() {
             return Err("give it a name".into());
         }
-        if !(self.density.is_finite() && self.density > 0.0) {
-            return Err(format!("density is {}, it must be positive, in kg/m³", self.density));
-        }
-        if !(self.solids > 0.0 && self.solids <= 1.0) {
-            return Err(format!("solids is {}, it must lie above 0 and at most at 1", self.solids));
-        }
+        let liquid = self.liquid().map_err(|error| error.to_string())?;
         let paint = match (&self.absorption, &self.scattering, &self.over_black, &self.over_white) {
             (Some(k), Some(s), None, None) => {
                 let (k, s) = (spectrum("absorption", k)?, spectrum("scattering", s)?);
@@ -167,7 +154,18 @@ impl PaintEntry {
             _ => return Err("give absorption and scattering, or over_black and over_white".into()),
         };
         let paint = paint.map_err(|error| error.to_string())?;
-        Ok(NamedPaint { name: self.name.clone(), paint, density: self.density, solids: self.solids })
+        Ok(NamedPaint { name: self.name.clone(), paint, liquid })
+    }
+
+    fn liquid(&self) -> Result<WetPaint, paint_sim::Error> {
+        let usual = WetPaint::default();
+        let liquid = WetPaint {
+            density: self.density.unwrap_or(usual.density),
+            viscosity: self.viscosity.unwrap_or(usual.viscosity),
+            yield_stress: self.yield_stress.unwrap_or(usual.yield_stress),
+            ..self.solids.map_or(usual, WetPaint::of_solids)
+        };
+        liquid.check().map(|()| liquid)
     }
 }
 

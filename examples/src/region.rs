@@ -53,6 +53,9 @@ pub enum RegionError {
         /// Least and largest coordinates of the mesh.
         extent: Box<[[f64; 3]; 2]>,
     },
+    /// Nothing is left to paint.
+    #[error("--keep-clean {0}: nothing of the mesh is left to paint: give a smaller region")]
+    AllClean(String),
     /// A mask without texture coordinates to lie on.
     #[error("--region {0}: the mesh has no texture coordinates; unwrap it first, and give the atlas.obj as the mesh")]
     NoCoordinates(String),
@@ -79,12 +82,28 @@ pub struct Scene {
     pub canvas: TriangleMesh,
     /// What stands in the way, with vertices of its own.
     pub obstacles: TriangleMesh,
+    /// Faces of the canvas that stay clean, windows in a front; empty where there are none.
+    pub clean: Vec<bool>,
 }
 
 impl Scene {
     /// A mesh that is painted everywhere.
     pub fn whole(canvas: TriangleMesh) -> Self {
-        Self { canvas, obstacles: TriangleMesh::default() }
+        Self { canvas, ..Self::default() }
+    }
+
+    /// What lies in a region, also, stays clean. Faces across its border are divided as by [`Region::split`].
+    ///
+    /// # Errors
+    /// [`RegionError`].
+    pub fn keep_clean(&mut self, region: &Region, finest: f64, unit: f64) -> Result<(), RegionError> {
+        let Division { inside, source, .. } = region.divided(&mut self.canvas, finest, unit)?;
+        if !inside.contains(&true) {
+            return Err(region.empty(&self.canvas, String::new()));
+        }
+        let before = |&face: &u32| self.clean.get(face as usize) == Some(&true);
+        self.clean = source.iter().zip(inside).map(|(source, inside)| inside || before(source)).collect();
+        if self.clean.contains(&false) { Ok(()) } else { Err(RegionError::AllClean(region.to_string())) }
     }
 }
 
@@ -95,46 +114,8 @@ impl Region {
     /// # Errors
     /// [`RegionError`].
     pub fn split(&self, mut mesh: TriangleMesh, finest: f64, unit: f64) -> Result<Scene, RegionError> {
-        if let Some(k) = mesh.positions.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
-            return Err(RegionError::NotFinite(k));
-        }
-        // A texel that is none is refused by those who lay it out.
-        let finest = if finest > 0.0 { finest } else { f64::INFINITY };
         let before = mesh.faces.len();
-        let mut hint = String::new();
-        let here = self.relative_to(mesh.origin);
-        let mut inside = match &here {
-            Self::Pick(point) => self.picked(&mesh, Point3::from(*point), finest, DEFAULT_MEMORY_M / unit)?,
-            Self::Box(corners) => {
-                let (low, high) = sides(corners);
-                divide(&mut mesh, finest, &|s| (0..3).all(|c| (low[c]..=high[c]).contains(&s.point[c])))?
-            }
-            Self::Plane([px, py, pz, nx, ny, nz, radius]) => {
-                let (centre, normal) = (Point3::new(*px, *py, *pz), Vector3::new(*nx, *ny, *nz).normalize());
-                let near = |s: &Sample| {
-                    let way = s.point - centre;
-                    way.norm() <= *radius && way.dot(&normal).abs() <= OFF_PLANE * radius
-                };
-                let behind = |s: &Sample| near(s) && s.normal.dot(&normal) <= -SAME_SIDE;
-                if (0..mesh.faces.len()).any(|f| samples_of_face(mesh.corners(f), finest).iter().any(behind)) {
-                    hint = " on the side of its normal, but something on the other: turn the normal about".into();
-                }
-                divide(&mut mesh, finest, &|s| near(s) && s.normal.dot(&normal) >= SAME_SIDE)?
-            }
-            Self::Mask(path) => {
-                if mesh.uv.is_none() {
-                    return Err(RegionError::NoCoordinates(self.to_string()));
-                }
-                let picture = open_upright(path)
-                    .map_err(|e| RegionError::Mask { region: self.to_string(), why: e.to_string() })?
-                    .to_luma8();
-                let side = |c: f64, n: u32| ((c.rem_euclid(1.0) * f64::from(n)) as u32).min(n - 1);
-                divide(&mut mesh, finest, &|s| {
-                    let [u, v] = s.uv;
-                    picture.get_pixel(side(u, picture.width()), side(1.0 - v, picture.height())).0[0] > 127
-                })?
-            }
-        };
+        let Division { mut inside, mut hint, .. } = self.divided(&mut mesh, finest, unit)?;
         let divided = mesh.faces.len() - before;
         if divided > 0 {
             mesh.notes.push(format!("{divided} faces more where the border of the region divides them"));
@@ -153,6 +134,54 @@ impl Region {
             return Err(self.empty(&mesh, hint));
         }
         Ok(separated(mesh, &inside))
+    }
+
+    /// Divides the faces across the border; which of them lie inside.
+    fn divided(&self, mesh: &mut TriangleMesh, finest: f64, unit: f64) -> Result<Division, RegionError> {
+        if let Some(k) = mesh.positions.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+            return Err(RegionError::NotFinite(k));
+        }
+        // A texel that is none is refused by those who lay it out.
+        let finest = if finest > 0.0 { finest } else { f64::INFINITY };
+        let mut hint = String::new();
+        let here = self.relative_to(mesh.origin);
+        let division = match &here {
+            Self::Pick(point) => Division {
+                inside: self.picked(mesh, Point3::from(*point), finest, DEFAULT_MEMORY_M / unit)?,
+                source: (0..mesh.faces.len() as u32).collect(),
+                hint: String::new(),
+            },
+            Self::Box(corners) => {
+                let (low, high) = sides(corners);
+                divide(mesh, finest, &|s| (0..3).all(|c| (low[c]..=high[c]).contains(&s.point[c])))?
+            }
+            Self::Plane([px, py, pz, nx, ny, nz, radius]) => {
+                let (centre, normal) = (Point3::new(*px, *py, *pz), Vector3::new(*nx, *ny, *nz).normalize());
+                let near = |s: &Sample| {
+                    let way = s.point - centre;
+                    way.norm() <= *radius && way.dot(&normal).abs() <= OFF_PLANE * radius
+                };
+                let behind = |s: &Sample| near(s) && s.normal.dot(&normal) <= -SAME_SIDE;
+                if (0..mesh.faces.len()).any(|f| samples_of_face(mesh.corners(f), finest).iter().any(behind)) {
+                    hint = " on the side of its normal, but something on the other: turn the normal about".into();
+                }
+                divide(mesh, finest, &|s| near(s) && s.normal.dot(&normal) >= SAME_SIDE)?
+            }
+            Self::Mask(path) => {
+                if mesh.uv.is_none() {
+                    return Err(RegionError::NoCoordinates(self.to_string()));
+                }
+                let picture = open_upright(path)
+                    .map_err(|e| RegionError::Mask { region: self.to_string(), why: e.to_string() })?
+                    .to_luma8();
+                let side = |c: f64, n: u32| ((c.rem_euclid(1.0) * f64::from(n)) as u32).min(n - 1);
+                divide(mesh, finest, &|s| {
+                    let [u, v] = s.uv;
+                    picture.get_pixel(side(u, picture.width()), side(1.0 - v, picture.height())).0[0] > 127
+                })?
+            }
+        };
+        Ok(Division { hint, ..division })
     }
 
     /// The region about another origin.
@@ -204,15 +233,24 @@ impl Region {
     }
 }
 
+/// Faces divided at a border.
+struct Division {
+    inside: Vec<bool>,
+    /// The face that each was before.
+    source: Vec<u32>,
+    /// What may be wrong where nothing lies inside.
+    hint: String,
+}
+
 /// Divides the faces across a border; says which faces lie inside.
-fn divide(mesh: &mut TriangleMesh, finest: f64, inside: &dyn Fn(&Sample) -> bool) -> Result<Vec<bool>, RegionError> {
+fn divide(mesh: &mut TriangleMesh, finest: f64, inside: &dyn Fn(&Sample) -> bool) -> Result<Division, RegionError> {
     let TriangleMesh { positions, faces, colours, uv, materials, .. } = mesh;
     let uv = uv.as_mut().map(|uv| EditableUv { coordinates: &mut uv.coordinates, faces: &mut uv.faces });
     let division = divide_at_border(EditableMesh { positions, faces, colours: colours.as_mut(), uv }, finest, inside)?;
     if let Some(materials) = materials {
         materials.faces = division.source.iter().map(|&face| materials.faces[face as usize]).collect();
     }
-    Ok(division.inside)
+    Ok(Division { inside: division.inside, source: division.source, hint: String::new() })
 }
 
 fn sides(corners: &[f64; 6]) -> ([f64; 3], [f64; 3]) {
@@ -237,7 +275,7 @@ fn separated(mut mesh: TriangleMesh, inside: &[bool]) -> Scene {
         let mut k = 0..;
         materials.faces.retain(|_| k.next().is_some_and(|k: usize| inside[k]));
     }
-    Scene { canvas: mesh, obstacles }
+    Scene { canvas: mesh, obstacles, clean: Vec::new() }
 }
 
 const USAGE: &str = "give box:x0,y0,z0,x1,y1,z1, plane:px,py,pz,nx,ny,nz,RADIUS, pick:px,py,pz or mask:PNG, in the coordinates of the \

@@ -1,6 +1,7 @@
 //! What a run found: `report.json` for programs, `report.md` for people.
 
 mod check;
+mod film;
 mod identified;
 mod localisation;
 mod reach;
@@ -14,6 +15,7 @@ use serde::Serialize;
 use crate::whole_file;
 
 pub use check::{Check, Requirement, Unit};
+pub use film::FilmFigures;
 pub use identified::IdentifiedFigures;
 pub use localisation::LocalisationReport;
 pub use reach::ReachNeeds;
@@ -151,15 +153,9 @@ pub struct Report {
     /// Time of the plans that was not flown, as the robot could not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_flown_s: Option<f64>,
-    /// Error of the film's thickness as the robot saw it over that thickness (both RMS), where it is a tenth of a unit or more and not opaque.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub film_estimate_error_share: Option<f64>,
-    /// Share of those texels that it saw.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub film_estimate_seen_share: Option<f64>,
-    /// Paint that it found to be missing, and painted again.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub paint_missing_kg: Option<f64>,
+    /// What became of the film.
+    #[serde(flatten)]
+    pub film: FilmFigures,
     /// What an excitation flight told.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub identified: Option<IdentifiedFigures>,

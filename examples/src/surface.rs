@@ -166,6 +166,13 @@ impl PaintSurface {
             .collect()
     }
 
+    /// Which pixels lie on faces of the mesh that are marked; none where there are no marks.
+    pub fn clean(&self, marked: &[bool]) -> Vec<bool> {
+        let source = self.disk().face_source();
+        let on_marked = |point: uv_param::SurfacePoint| marked.get(source[point.face as usize] as usize) == Some(&true);
+        self.pixels().map(|(x, y)| self.texels.at(x, y).is_some_and(on_marked)).collect()
+    }
+
     /// The texels that lie on the surface, with the pixel of each.
     pub fn film_texels(&self) -> (Vec<Texel>, Vec<usize>) {
         let mut texels = Vec::new();

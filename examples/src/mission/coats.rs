@@ -20,8 +20,7 @@ use super::planned_mission::PlannedMission;
 use super::run::Mission;
 use crate::appearance::UNIT_THICKNESS;
 
-/// Until the film of an acrylic is dry to touch at 20 °C, seconds, and until another tank is mounted.
-const DRYING_S: f64 = 900.0;
+/// Until another tank is mounted, seconds.
 const TOOL_CHANGE_S: f64 = 300.0;
 
 /// What was decided about one paint.
@@ -242,10 +241,23 @@ impl Wall {
     }
 }
 
-/// Times that the tank is changed between flights of these durations, seconds, and how long all takes: while one film dries, another tank is mounted.
-pub(super) fn time_of_coats(flights: &[f64]) -> (usize, f64) {
-    let changes = flights.len().saturating_sub(1);
-    (changes, flights.iter().sum::<f64>() + changes as f64 * DRYING_S.max(TOOL_CHANGE_S))
+/// How long one paint takes, seconds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PaintTime {
+    /// In the air.
+    pub(super) flown: f64,
+    /// Between its coats, while one dries.
+    pub(super) waited: f64,
+    /// Until its last is dry to touch.
+    pub(super) drying: f64,
+}
+
+/// How long all paints take, seconds: while one dries, another tank is mounted.
+pub(super) fn time_of_paints(paints: &[PaintTime]) -> f64 {
+    let ground = |paint: &PaintTime| paint.drying.max(TOOL_CHANGE_S);
+    let between = paints.len().saturating_sub(1);
+    paints.iter().map(|paint| paint.flown + paint.waited).sum::<f64>()
+        + paints[..between].iter().map(ground).sum::<f64>()
 }
 
 /// Linear sRGB as three pictures; the mean beside the surface, so that its edge is not darker.

@@ -9,14 +9,16 @@ use paint_sim::colour::ciede2000;
 use paint_sim::surface::Hit;
 use serde::Serialize;
 
-use super::coats::{Coats, Look, Wall, linear, time_of_coats};
+use super::coats::{Coats, Look, PaintTime, Wall, linear, time_of_paints};
 use super::error::MissionError;
 use super::figures::mean;
+use super::kept_clean::KeptClean;
 use super::mission_output::{save, save_flights, save_flown_path};
 use super::painted_mesh::save_painted_mesh;
 use super::picture_figures::{PictureFigures, save_out_of_gamut, wanted_looks};
 use super::progress_views::ProgressViews;
 use super::run::Mission;
+use super::sagging::{sagging_share, save_sagging};
 use super::shading::shading_of_colours;
 use super::view::{camera, picture_of, view};
 use super::written_file::{unwritable, write};
@@ -61,6 +63,17 @@ pub struct CoatsFigures {
     pub path_length_m: f64,
     /// Paint that stayed on the surface.
     pub paint_deposited_kg: f64,
+    /// Share by area of the painted surface on which a paint was so thick that it ran.
+    pub sagging_share: f64,
+    /// Area that stays clean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept_clean_m2: Option<f64>,
+    /// Mean thickness of all paints there nevertheless.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept_clean_thickness_mean_m: Option<f64>,
+    /// Share of that area with a micrometre or more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept_clean_soiled_share: Option<f64>,
     /// Strokes of all.
     pub strokes: usize,
     /// Moments at which the flown robot touched the surface.
@@ -175,6 +188,7 @@ fn save_pictures(
     let page: Vec<_> = painted.iter().map(|look| look.as_ref().map(Look::srgb8)).collect();
     let vertices = save_painted_mesh(task, &page, folder)?;
     let missions: Vec<&Mission> = coats.missions().map(|(_, mission)| mission).collect();
+    save_sagging(&missions, folder)?;
     save_flights(&missions, &vertices, folder)
 }
 
@@ -210,7 +224,13 @@ fn figures(coats: &Coats, reports: &[Report], wanted: &[Option<Look>], painted: 
     let differences = differences(wanted, painted);
     let difference = |k: usize| differences[k];
     let flight_times = of(|r| r.flight_time_s);
-    let (tool_changes, mission_time_s) = time_of_coats(&flight_times);
+    let time = |(flown, (_, mission)): (&f64, (_, &Mission))| {
+        let [waited, drying] = mission.ground_times;
+        PaintTime { flown: *flown, waited, drying }
+    };
+    let times: Vec<PaintTime> = flight_times.iter().zip(coats.missions()).map(time).collect();
+    let missions: Vec<&Mission> = coats.missions().map(|(_, mission)| mission).collect();
+    let clean = KeptClean::of(&missions);
     let name = |folder: &Path| folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     CoatsFigures {
         version: env!("CARGO_PKG_VERSION"),
@@ -223,11 +243,15 @@ fn figures(coats: &Coats, reports: &[Report], wanted: &[Option<Look>], painted: 
         unreachable_paint_share_by_paint: of(|r| r.unreachable_paint_share),
         ssim_painted_by_paint: of(|r| r.ssim_painted),
         flight_time_s: sum(|r| r.flight_time_s),
-        tool_changes,
-        mission_time_s,
+        tool_changes: times.len().saturating_sub(1),
+        mission_time_s: time_of_paints(&times),
         not_flown_s: coats.grounded().map(|grounded| grounded.left_s),
         path_length_m: sum(|r| r.path_length_m),
         paint_deposited_kg: sum(|r| r.paint_deposited_kg),
+        sagging_share: sagging_share(&missions),
+        kept_clean_m2: clean.map(|clean| clean.area),
+        kept_clean_thickness_mean_m: clean.map(|clean| clean.thickness),
+        kept_clean_soiled_share: clean.map(|clean| clean.soiled),
         strokes: reports.iter().map(|r| r.strokes).sum(),
         collisions: reports.iter().map(|r| r.collisions).sum(),
         limit_violations: reports.iter().map(|r| r.limit_violations).sum(),

@@ -110,7 +110,7 @@ fn adaptive_rows(
     let seen = visible(&below)?;
     let depths = on_page(&task.coverage.map(|_| 0.0), &picture.pixels, &picture.separated[paint]);
     let wanted = depths.map(|depth| seen.forward(depth).clamp(0.0, 1.0));
-    let weight = decide::weights(&task.coverage, &task.surface, &task.in_reach);
+    let weight = decide::weights(task);
     let kernel = kernel(settings)?;
     let problem = PaintProblem::new(&wanted)
         .with_weight(&weight)

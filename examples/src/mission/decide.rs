@@ -9,26 +9,23 @@ use paint_net::{Deconvolution, Feedback, Image, Observer, OnSurface, PaintProble
 use super::error::MissionError;
 use super::footprints::Footprints;
 use super::nozzle::kernel;
-use super::settings::{MissionSettings, PainterChoice};
-use crate::appearance::Appearance;
+use super::painting_task::PaintingTask;
+use super::settings::PainterChoice;
 use crate::progress::Stage;
 use crate::surface::PaintSurface;
 
-/// Weight of texels out of reach against those in reach.
-pub(super) const UNPAINTABLE_WEIGHT: f64 = 0.02;
+/// Weight of texels out of reach against those in reach: what nobody can spray must not pull paint from its neighbours, but a little weight
+/// keeps overspray off it.
+const UNPAINTABLE_WEIGHT: f64 = 0.02;
+/// Weight of what stays clean.
+const CLEAN_WEIGHT: f64 = 10.0;
 
-/// Layers of sprays for the wanted picture; no spray lies where `paintable` is false. Paint that falls beyond a seam counts where it lies,
+/// Layers of sprays for the wanted picture; no spray lies on what is out of reach. Paint that falls beyond a seam counts where it lies,
 /// and volumes are those for what every spray leaves on the surface.
-pub(super) fn decide(
-    wanted: &Image,
-    coverage: &Image,
-    surface: &PaintSurface,
-    paintable: &[bool],
-    appearance: &Appearance,
-    settings: &MissionSettings,
-) -> Result<Vec<Painting>, MissionError> {
+pub(super) fn decide(wanted: &Image, task: &PaintingTask) -> Result<Vec<Painting>, MissionError> {
     let stage = Stage::start("decide");
-    let weight = weights(coverage, surface, paintable);
+    let PaintingTask { surface, in_reach: paintable, appearance, settings, .. } = task;
+    let weight = weights(task);
     let ceiling = ceiling(wanted, surface)?;
     let kernel = kernel(settings)?;
     let problem = PaintProblem::new(wanted)
@@ -74,16 +71,26 @@ pub(super) fn ceiling(wanted: &Image, surface: &PaintSurface) -> Result<Image, p
     ink_ceiling(wanted, &points, &pixels)
 }
 
-/// How much each texel matters: what nobody can spray must not pull paint from its neighbours, but a little weight keeps overspray off it.
-pub(super) fn weights(coverage: &Image, surface: &PaintSurface, paintable: &[bool]) -> Image {
-    let mut weight = Image::from_fn(coverage.width(), coverage.height(), |x, y| {
-        let share = if paintable[y * coverage.width() + x] { 1.0 } else { UNPAINTABLE_WEIGHT };
-        share * coverage.at(x, y)
-    });
-    for (ghost, _) in surface.beyond_seams.ghosts() {
-        weight.data_mut()[*ghost] = 0.0;
+/// How much a pixel of the surface matters.
+pub(super) fn weight(task: &PaintingTask, pixel: usize) -> f64 {
+    match (task.clean[pixel], task.in_reach[pixel]) {
+        (true, _) => CLEAN_WEIGHT,
+        (_, true) => 1.0,
+        (_, false) => UNPAINTABLE_WEIGHT,
     }
-    weight
+}
+
+/// The same of all pixels, those beside the surface too.
+pub(super) fn weights(task: &PaintingTask) -> Image {
+    let PaintingTask { coverage, surface, .. } = task;
+    let mut weights = coverage.clone();
+    for (pixel, covered) in weights.data_mut().iter_mut().enumerate() {
+        *covered *= weight(task, pixel);
+    }
+    for (ghost, _) in surface.beyond_seams.ghosts() {
+        weights.data_mut()[*ghost] = 0.0;
+    }
+    weights
 }
 
 /// One painting, or one for each layer.

@@ -8,7 +8,7 @@ use paint_net::path::Stroke;
 use paint_net::{Painting, Spray};
 
 use super::colour_rows::{PaintRows, on_page};
-use super::decide::UNPAINTABLE_WEIGHT;
+use super::decide::weight;
 use super::error::MissionError;
 use super::painting_task::PaintingTask;
 use super::picture_task::PictureTask;
@@ -83,8 +83,7 @@ pub(super) fn decide_colours(task: &PaintingTask, picture: &mut PictureTask) -> 
 
 /// How much each texel matters.
 pub(super) fn weights(task: &PaintingTask, picture: &PictureTask) -> Vec<f64> {
-    let weigh = |&pixel: &usize| if task.in_reach[pixel] { 1.0 } else { UNPAINTABLE_WEIGHT };
-    picture.pixels.iter().map(weigh).collect()
+    picture.pixels.iter().map(|&pixel| weight(task, pixel)).collect()
 }
 
 /// CIELAB of every texel with these depths, paint after paint.

@@ -11,12 +11,14 @@ use super::darker_than_wanted;
 use super::error::MissionError;
 use super::fly::LayerFlight;
 use super::inspect::Inspection;
+use super::kept_clean::KeptClean;
 use super::run::Mission;
+use super::sagging::sagging_share;
 use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::MeshSurface;
 use crate::onboard::LocalisationFigures;
-use crate::report::{LocalisationReport, Report, TimeFigures, peak_resident_bytes};
+use crate::report::{FilmFigures, LocalisationReport, Report, TimeFigures, peak_resident_bytes};
 
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;
@@ -35,8 +37,9 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
 
     let balance = mission.film.mass_balance();
     let on_texels: u64 = mission.film.volumes().iter().sum();
-    let kilograms = |quanta: u64| quanta as f64 * QUANTUM * mission.task.paint.density;
-    let unaccounted = (i128::from(balance.emitted) - i128::from(on_texels) - i128::from(balance.overspray)).abs();
+    let kilograms = |quanta: u64| quanta as f64 * QUANTUM * mission.task.paint.liquid.density;
+    let unaccounted =
+        (i128::from(balance.emitted) - i128::from(on_texels) - i128::from(balance.overspray + balance.dripped)).abs();
 
     let canvas = mission.task.layers.last().map_or(&mission.task.wanted, |l| &l.ink);
     let filtered = ideal(&mission.task.wanted, mission.task.settings.spot / mission.task.settings.texel)?;
@@ -85,7 +88,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         transit_s: mission.flights.iter().map(|f| f.route.transit_time).sum(),
         paint_emitted_kg: kilograms(balance.emitted),
         paint_deposited_kg: kilograms(on_texels),
-        paint_overspray_kg: kilograms(balance.overspray),
+        paint_overspray_kg: kilograms(balance.overspray + balance.dripped),
         mass_balance_relative: unaccounted as f64 / balance.emitted.max(1) as f64,
         psnr_canvas_db: metrics::psnr(canvas, &mission.task.wanted, weight)?,
         psnr_ideal_db: metrics::psnr(&filtered, &mission.task.wanted, weight)?,
@@ -112,9 +115,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         localisation: own.map(|own| LocalisationReport::of(&own, flight_time)),
         sorties: mission.sorties(),
         not_flown_s: mission.grounded.as_ref().map(|grounded| grounded.left_s),
-        film_estimate_error_share: mission.looked.map(|looked| looked.film_error),
-        film_estimate_seen_share: mission.looked.map(|looked| looked.film_seen),
-        paint_missing_kg: mission.looked.map(|looked| looked.missing * mission.task.paint.density),
+        film: film_figures(mission),
         identified: mission.identified.as_ref().map(|told| told.figures(&mission.task.settings.airframe)),
         darker_than_wanted_share: darker_than_wanted::share(mission)?,
         seam_length_m: mission.task.surface.disk().seam_length(),
@@ -125,6 +126,19 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         wall_s: mission.task.started.elapsed().as_secs_f64(),
         peak_rss_bytes: peak_resident_bytes(),
     })
+}
+
+fn film_figures(mission: &Mission) -> FilmFigures {
+    let (clean, looked) = (KeptClean::of(&[mission]), &mission.looked);
+    FilmFigures {
+        sagging_share: sagging_share(&[mission]),
+        kept_clean_m2: clean.map(|clean| clean.area),
+        kept_clean_thickness_mean_m: clean.map(|clean| clean.thickness),
+        kept_clean_soiled_share: clean.map(|clean| clean.soiled),
+        film_estimate_error_share: looked.map(|looked| looked.film_error),
+        film_estimate_seen_share: looked.map(|looked| looked.film_seen),
+        paint_missing_kg: looked.map(|looked| looked.missing * mission.task.paint.liquid.density),
+    }
 }
 
 /// How even a coat is where it is wanted and can be reached, by area.

@@ -6,19 +6,19 @@ use paint_planner::mission::Route;
 use paint_planner::onboard::sorties;
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{Faults, Localisation, Reference};
-use paint_sim::{Film, FlightSettings, TriangleSurface};
+use paint_sim::{FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
 use super::flight_conditions::{counted_flight, usual_flight};
 use super::flight_sensors::{Poses, camera_before};
 use super::flyer::{Flight, Flyer, Purpose};
 use super::grounded::Grounded;
-use super::nozzle::spray_model;
 use super::painting_task::PaintingTask;
 use super::plan::Planned;
 use super::settings::MissionSettings;
 use super::simulated_flight::{fly_plan, reference};
 use super::sorties::{FlownPiece, Sorties, in_pieces};
+use super::wet_surface::{DriedSurface, WetSurface};
 use crate::adapters::Robot;
 use crate::onboard::{LocalisationFigures, Piece};
 use crate::progress::Stage;
@@ -45,6 +45,8 @@ pub struct LayerFlight {
     pub(super) sorties: usize,
     /// Time of the plan that was not flown, s: a later sortie could not be.
     pub(super) left_s: f64,
+    /// Whether the paint before it is dry when it begins.
+    pub(super) on_dry: bool,
     /// Flown with a localisation that errs by 7 cm.
     pub slam: FlightLog,
     /// The baseline's plan flown with pan and tilt at zero (Paper II, section 7.2).
@@ -76,11 +78,13 @@ pub(super) fn fly(
     flyer: &mut dyn Flyer,
 ) -> Result<Flown, MissionError> {
     let stage = Stage::start("fly");
-    let count = planned.layers.len();
+    let each = planned.layers.len();
+    let count = each * planned.coats;
     let mut flights = Vec::with_capacity(count);
     let mut grounded: Option<Grounded> = None;
     let mut faulty = task.settings.clone();
-    for (k, (route, plan, smoothing)) in planned.layers.into_iter().enumerate() {
+    let coats = std::iter::repeat_n(planned.layers, planned.coats).flatten();
+    for (k, (route, plan, smoothing)) in coats.enumerate() {
         if let Some(grounded) = &mut grounded {
             grounded.left_s += plan.trajectory.duration();
             continue;
@@ -111,6 +115,7 @@ pub(super) fn fly(
                     localisation,
                     sorties,
                     left_s,
+                    on_dry: layer > 0 && k % each == 0,
                     slam,
                     locked,
                 });
@@ -166,37 +171,42 @@ fn fly_sorties(
 /// Flights' paint on a surface.
 pub(super) struct Sprayed {
     /// The paint.
-    pub(super) film: Film,
-    /// Pixel of every texel of the film.
-    pub(super) pixels: Vec<usize>,
+    pub(super) surface: DriedSurface,
     /// Depth per pixel after each of equal parts of the spraying but the last; none of a picture's paint.
     pub(super) before: Vec<Image>,
 }
 
-/// Puts the paint of flights onto the texels.
+/// Puts the paint of flights onto the texels; before those marked so what is there dries.
 pub(super) fn spray<'a>(
-    flights: impl Iterator<Item = &'a FlightLog>,
+    flights: impl Iterator<Item = (&'a FlightLog, bool)>,
     task: &PaintingTask,
 ) -> Result<Sprayed, MissionError> {
     let stage = Stage::start("spray");
-    let (texels, pixels) = task.film_texels();
-    let mut film = Film::new(texels)?;
-    let shots: Vec<_> = flights.flat_map(|flight| flight.shots(SHOT_STEP)).collect();
+    let mut surface = WetSurface::new(task)?;
+    let flights: Vec<_> = flights.map(|(log, dry)| (log, log.timed_shots(SHOT_STEP), dry)).collect();
+    let total: usize = flights.iter().map(|(_, shots, _)| shots.len()).sum();
+    let part = total.div_ceil(PARTS).max(1);
     let (mut before, mut sprayed) = (Vec::new(), 0);
-    for part in shots.chunks(shots.len().div_ceil(PARTS).max(1)) {
-        // A picture's paints are shown together.
-        if sprayed > 0 && !task.of_picture {
-            before.push(task.depth_of(&film, &pixels));
+    for (k, (log, shots, _)) in flights.iter().enumerate() {
+        let mut rest = &shots[..];
+        while !rest.is_empty() {
+            let (now, later) = rest.split_at(rest.len().min(part - sprayed % part));
+            surface.spray(now, task, &|done| stage.share((sprayed + done) as f64 / total as f64))?;
+            (sprayed, rest) = (sprayed + now.len(), later);
+            // A picture's paints are shown together.
+            if sprayed % part == 0 && sprayed < total && !task.of_picture {
+                before.push(surface.depth(task));
+            }
         }
-        film.deposit(part, &spray_model(&task.settings), task.met(), task.settings.threads, &mut |done, _| {
-            stage.share((sprayed + done) as f64 / shots.len() as f64);
-        })?;
-        sprayed += part.len();
+        let duration = log.samples.last().map_or(0.0, |sample| sample.time);
+        surface.land(duration, flights.get(k + 1).is_some_and(|next| next.2))?;
     }
-    let balance = film.mass_balance();
+    let surface = surface.dry()?;
+    let balance = surface.film.mass_balance();
     let share = 100.0 * balance.deposited as f64 / balance.emitted.max(1) as f64;
-    stage.done(&format!("{share:.1} % of the paint on the surface"));
-    Ok(Sprayed { film, pixels, before })
+    let ran = if surface.ran.contains(&true) { ", some of which ran: see sagging.png" } else { "" };
+    stage.done(&format!("{share:.1} % of the paint on the surface{ran}"));
+    Ok(Sprayed { surface, before })
 }
 
 /// The flight whose paint counts, as it is `counted`, the same plan with a drifting localisation, and the smoothing plan with the gun locked.
@@ -251,9 +261,10 @@ pub(super) fn fly_three(
 mod tests {
     use paint_planner::onboard::Endurance;
     use paint_planner::timing::TimingPolicy;
-    use paint_sim::Shot;
+    use paint_sim::{Film, Shot};
     use ptu_kinematics::Ptu;
 
+    use super::super::nozzle::spray_model;
     use super::super::simulated_flight::{fly_reference, noise};
     use super::super::test_panel;
     use super::*;
@@ -283,7 +294,8 @@ mod tests {
         let settings = MissionSettings { threads: 1, ..MissionSettings::default() };
         let log = test_panel::flown(&settings).1;
         let task = PaintingTask::undecided("wall", &Scene::whole(test_panel::mesh()), settings.clone()).unwrap();
-        let Sprayed { film, pixels, before } = spray(std::iter::once(&log), &task).unwrap();
+        let Sprayed { surface: DriedSurface { film, pixels, .. }, before } =
+            spray(std::iter::once((&log, false)), &task).unwrap();
         let mut at_once = Film::new(task.film_texels().0).unwrap();
         let shots = log.shots(SHOT_STEP);
         at_once.deposit(&shots, &spray_model(&settings), task.met(), 1, &mut |_, _| ()).unwrap();

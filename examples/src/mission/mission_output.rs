@@ -17,6 +17,7 @@ use super::painting_task::PaintingTask;
 use super::path_view::save_path;
 use super::progress_views::save_progress;
 use super::run::Mission;
+use super::sagging::save_sagging;
 use super::settings::PainterChoice;
 use super::shading::shading;
 use super::trajectory_table::trajectory_table;
@@ -44,6 +45,7 @@ const COAT: ErrorScale<'static> = ErrorScale {
 pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, MissionError> {
     let stage = Stage::start("pictures");
     save_textures(mission, folder)?;
+    save_sagging(&[mission], folder)?;
     stage.share(0.2);
     if mission.task.of_picture {
         // Its surface and its flight are shown with those of the other paints.

@@ -56,6 +56,8 @@ pub struct PaintingTask {
     pub(super) coverage: Image,
     /// Which texels the robot can serve.
     pub(super) in_reach: Vec<bool>,
+    /// Which texels stay clean; not in reach either, as nothing is sprayed at them.
+    pub(super) clean: Vec<bool>,
     /// Which texels it could serve but for keep-out volumes and tether.
     pub(super) lost_to_constraints: Vec<bool>,
     /// What the texels out of reach would need, where they are many.
@@ -76,13 +78,13 @@ impl PaintingTask {
         design.check_movable(&settings.placement, settings.viewpoint)?;
         let mut task = Self::undecided(name, scene, settings)?;
         let settings = &task.settings;
-        // Nothing is wanted beside the surface, and no more than the paint can show.
+        // Nothing is wanted beside the surface nor where it stays clean, and no more than the paint can show.
         let wanted = design.on_surface(&task.surface, &scene.canvas, &settings.placement, settings.viewpoint)?;
         let mut wanted = wanted.map(|ink| ink.min(task.appearance.ink().max_ink()));
-        for (ink, covered) in wanted.data_mut().iter_mut().zip(task.coverage.data()) {
-            *ink *= covered;
+        for (k, ink) in wanted.data_mut().iter_mut().enumerate() {
+            *ink *= if task.clean[k] { 0.0 } else { task.coverage.data()[k] };
         }
-        task.layers = decide(&wanted, &task.coverage, &task.surface, &task.in_reach, &task.appearance, settings)?;
+        task.layers = decide(&wanted, &task)?;
         task.wanted = wanted;
         Ok(task)
     }
@@ -102,7 +104,7 @@ impl PaintingTask {
 
         let coverage = surface.coverage();
         let stage = Stage::start("reach");
-        let in_reach = texels_in_reach(&surface, &settings)?;
+        let mut in_reach = texels_in_reach(&surface, &settings)?;
         let lost = texels_lost_to_constraints(&in_reach, &surface, &settings)?;
         let percent = |texels: &[bool]| 100.0 * share(texels, &coverage);
         if !in_reach.contains(&true) {
@@ -121,6 +123,11 @@ impl PaintingTask {
         if let Some(needs) = &needs {
             say!("{}", needs.describe());
         }
+        let clean = surface.clean(&scene.clean);
+        in_reach.iter_mut().zip(&clean).for_each(|(reached, clean)| *reached &= !clean);
+        if !in_reach.contains(&true) {
+            return Err(MissionError::NothingToPaint("all that is in reach stays clean"));
+        }
         Ok(Self {
             settings,
             name: name.to_string(),
@@ -132,6 +139,7 @@ impl PaintingTask {
             wanted: coverage.map(|_| 0.0),
             coverage,
             in_reach,
+            clean,
             lost_to_constraints: lost,
             reach_needs: needs,
             layers: Vec::new(),

@@ -40,7 +40,7 @@ impl PictureFigures {
         let reached = (0..picture.pixels.len()).filter(|&k| in_reach.get(picture.pixels[k]) == Some(&true));
         let litres = |mission: &super::run::Mission| {
             let emitted = mission.film.mass_balance().emitted as f64 * paint_sim::spray::QUANTUM;
-            1e3 * emitted / mission.task.paint.solids
+            1e3 * emitted / mission.task.paint.liquid.solids
         };
         Self {
             ciede2000_in_gamut_mean: picture.difference_in_gamut(in_reach, painted),

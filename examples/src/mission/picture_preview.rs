@@ -4,10 +4,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::coats::{CoatTasks, Look, looks, time_of_coats};
+use super::coats::{CoatTasks, Look, PaintTime, looks, time_of_paints};
 use super::error::MissionError;
 use super::picture_figures::{save_out_of_gamut, wanted_looks};
 use super::plan::unrehearsed;
+use super::wet_surface::coats;
 use crate::pictures::Rgb;
 use crate::progress::Stage;
 use crate::report::save_figures;
@@ -61,8 +62,12 @@ pub fn preview_picture(tasks: &CoatTasks, folder: &Path) -> Result<Option<Pictur
     let (mut times, mut kilograms) = (Vec::new(), Vec::new());
     for coat in &tasks.coats {
         let flights = unrehearsed(&coat.task)?.flights;
-        times.push(flights.iter().map(|flight| flight.plan.trajectory.duration()).sum());
-        kilograms.push(flights.iter().map(|flight| flight.route.volume()).sum::<f64>() * coat.task.paint.density);
+        let once: f64 = flights.iter().map(|flight| flight.plan.trajectory.duration()).sum();
+        let (coats, drying) = coats(&coat.task);
+        let (many, again) = (coats as f64, coats as f64 - 1.0);
+        times.push(PaintTime { flown: many * once, waited: again * drying, drying });
+        kilograms
+            .push(flights.iter().map(|flight| flight.route.volume()).sum::<f64>() * coat.task.paint.liquid.density);
         stage.share(times.len() as f64 / tasks.coats.len() as f64);
     }
     let task = &first.task;
@@ -78,16 +83,15 @@ pub fn preview_picture(tasks: &CoatTasks, folder: &Path) -> Result<Option<Pictur
         Rgb::of_page(width, height, page).save(&folder.join(name))?;
     }
     save_out_of_gamut(picture, &wanted, [width, height], folder)?;
-    let (_, mission_time_s) = time_of_coats(&times);
     let figures = PicturePreview {
         version: env!("CARGO_PKG_VERSION"),
         surface: task.name.clone(),
         seed: task.settings.seed,
         paints: tasks.coats.iter().map(|coat| coat.task.paint.name.clone()).collect(),
-        flight_time_s: times.iter().sum(),
-        flight_time_s_by_paint: times,
+        flight_time_s: times.iter().map(|time| time.flown).sum(),
+        flight_time_s_by_paint: times.iter().map(|time| time.flown).collect(),
         paint_kg_by_paint: kilograms,
-        mission_time_s,
+        mission_time_s: time_of_paints(&times),
         ciede2000_optimum_mean: picture.difference_in_gamut(&task.in_reach, |k| Some(picture.optimum[k])),
         out_of_gamut_share: picture.out_of_gamut_share(),
     };

@@ -60,8 +60,10 @@ impl PictureTask {
     ) -> Result<Self, MissionError> {
         let stage = Stage::start("separate");
         let bare: Vec<[f64; 3]> = wall.spectra.iter().map(spectrum_linear_srgb).collect();
+        // The wall shows also where it stays clean.
+        let picture = |pixel: usize| if task.clean[pixel] { [0.0; 4] } else { picture[pixel] };
         let over_wall = |(&pixel, &of): (&usize, &u32)| {
-            let [r, g, b, opacity] = picture[pixel].map(f64::from);
+            let [r, g, b, opacity] = picture(pixel).map(f64::from);
             let below = bare[of as usize].map(|c| c.clamp(0.0, 1.0) * (1.0 - opacity));
             [r + below[0], g + below[1], b + below[2]]
         };
@@ -70,7 +72,7 @@ impl PictureTask {
         let bands: Vec<Bands> = wall.spectra.iter().map(FilmStack::bands).collect();
         let separation =
             TexelSeparation { deepest: DEEPEST, threads: task.settings.threads, ..TexelSeparation::default() };
-        let opaque: Vec<bool> = pixels.iter().map(|&pixel| picture[pixel][3] > 0.0).collect();
+        let opaque: Vec<bool> = pixels.iter().map(|&pixel| picture(pixel)[3] > 0.0).collect();
         let colours = usual_colours(&wanted, &opaque);
         if colours.is_empty() {
             return Err(MissionError::NothingToPaint("the picture does not lie on it"));

@@ -16,6 +16,7 @@ use super::nozzle::{kernel, sprays};
 use super::painting_task::PaintingTask;
 use super::rehearsal::WindRehearsal;
 use super::settings::{MissionSettings, PainterChoice};
+use super::wet_surface::coats;
 use crate::adapters::MeshSurface;
 use crate::progress::Stage;
 use crate::say;
@@ -28,6 +29,8 @@ const SHORTEST_RETRY: f64 = 2.0;
 pub(super) struct Planned {
     /// Targets, plan, and the baseline's plan on the same targets.
     pub(super) layers: Vec<(Route, Plan, Plan)>,
+    /// Coats in which they are flown, each after the one before has dried; a flight carries its share of the paint.
+    pub(super) coats: usize,
     /// Time the planner took, seconds on one core.
     pub(super) seconds: f64,
     /// Paint of layers that no pose of the robot can spray at all, m³.
@@ -137,11 +140,20 @@ pub(super) fn replan(task: &PaintingTask, draft: &mut Draft) -> Result<(), Missi
 }
 
 /// The flights with what they are compared with.
-pub(super) fn finish(task: &PaintingTask, Draft { mission, seconds }: Draft) -> Result<Planned, MissionError> {
+pub(super) fn finish(task: &PaintingTask, mut draft: Draft) -> Result<Planned, MissionError> {
+    let (coats, _) = coats(task);
+    if coats > 1 {
+        say!("{}: in {coats} coats, as it would run in one", task.paint.name);
+        let targets = draft.mission.flights.iter_mut().flat_map(|flight| &mut flight.route.targets);
+        targets.for_each(|target| target.dose /= coats as f64);
+        replan(task, &mut draft)?;
+    }
+    let Draft { mission, seconds } = draft;
     let PaintingTask { layers, surface, planned_robot, settings, .. } = task;
     let stage = Stage::start("compare");
     let mesh = MeshSurface(&surface.world);
     let mut planned = Planned {
+        coats,
         seconds,
         unreachable_paint: mission.refused_volume,
         kept_off: mission.flights.iter().map(MissionFlight::kept_off).sum(),

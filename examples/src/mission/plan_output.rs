@@ -228,7 +228,7 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         times: TimeFigures::of(mission.layers().map(|(_, plan)| plan), &task.settings.planner.timing),
         path_length_m: sum(&Plan::path_length),
         valve_open_share: sum(&Plan::open_time) / flight_time,
-        paint_kg: volume * task.paint.density,
+        paint_kg: volume * task.paint.liquid.density,
         normal_deviation_mean_m: mean(deviations.iter().copied()),
         normal_deviation_max_m: deviations.iter().fold(0.0, |most, &d| most.max(d)),
         max_speed_m_per_s: most(&|plan| plan.report.extrema.speed),

@@ -17,6 +17,7 @@ use super::mission_output::{painted_view, texture};
 use super::painting_task::PaintingTask;
 use super::planned_mission::PlannedMission;
 use super::simulated_flight::reference;
+use super::wet_surface::DriedSurface;
 use crate::adapters::PlanReference;
 use crate::appearance::DENSITY;
 
@@ -71,7 +72,7 @@ impl<'a> PlannedFlight<'a> {
     /// Puts the paint of a flight onto the surface, writes `painted.png` and `painted_view.png`, and counts.
     pub fn save(&self, log: &FlightLog, folder: &Path) -> Result<FlownFigures, MissionError> {
         let task = self.task;
-        let Sprayed { film, pixels, .. } = spray(std::iter::once(log), task)?;
+        let Sprayed { surface: DriedSurface { film, pixels, .. }, .. } = spray(std::iter::once((log, false)), task)?;
         let depth = task.depth_of(&film, &pixels);
         texture(task, &depth).save(&folder.join("painted.png"))?;
         painted_view(task, &depth)?.save(&folder.join("painted_view.png"))?;

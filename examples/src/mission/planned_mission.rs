@@ -38,9 +38,10 @@ impl PlannedMission {
         self.layers().map(|(_, plan)| plan.trajectory.duration()).sum()
     }
 
-    /// Route and plan of every layer, in flying order.
+    /// Route and plan of every layer of every coat, in flying order.
     pub fn layers(&self) -> impl Iterator<Item = (&Route, &Plan)> {
-        self.planned.layers.iter().map(|(route, plan, _)| (route, plan))
+        let layers = || self.planned.layers.iter().map(|(route, plan, _)| (route, plan));
+        (0..self.planned.coats).flat_map(move |_| layers())
     }
 }
 

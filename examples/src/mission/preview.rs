@@ -114,7 +114,7 @@ fn estimate(task: &PaintingTask) -> Result<Preview, MissionError> {
         reach_needs: task.reach_needs,
         lost_to_constraints_share: task.share_lost_to_constraints(),
         wanted_in_reach_share: wanted(&task.coverage_in_reach()) / wanted(&task.coverage).max(f64::MIN_POSITIVE),
-        paint_kg: volume * task.paint.density,
+        paint_kg: volume * task.paint.liquid.density,
         flight_time_s: flights.iter().map(|flight| flight.plan.trajectory.duration()).sum(),
         strokes,
         deposit_error_at_seams: seams.map(|s| s.near),

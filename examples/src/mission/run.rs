@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 use paint_net::Image;
 use paint_planner::mission::TargetOutcomes;
 use paint_sim::Film;
-use paint_sim::flight::FlightSample;
+use paint_sim::flight::{FlightLog, FlightSample};
 use ptu_kinematics::Joints;
 
 use super::built_in_flyer::BuiltInFlyer;
@@ -16,6 +16,7 @@ use super::identify::{Identified, identify};
 use super::painting_task::PaintingTask;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
 use super::touch_up::{TouchUpFigures, touch_up};
+use super::wet_surface::DriedSurface;
 use crate::appearance::UNIT_THICKNESS;
 
 /// Thickness below which nothing is wanted, metres: ink is given to a few digits.
@@ -28,6 +29,10 @@ pub struct Mission {
     pub(super) film: Film,
     /// Pixel of every texel of the film.
     pub(super) pixels: Vec<usize>,
+    /// Texels from which paint has run.
+    pub(super) ran: Vec<bool>,
+    /// Time on the ground between coats, and after the last until it is dry to touch, s.
+    pub(super) ground_times: [f64; 2],
     /// Depth per pixel after each of equal parts of the spraying but the last; none of a picture's paint.
     pub(super) partly_painted: Vec<Image>,
     pub(super) planning: f64,
@@ -61,26 +66,29 @@ impl Mission {
         let (kept_off, left_bare, outcomes) = (planned.kept_off, planned.left_bare, planned.outcomes);
         let identified = identify(&mut task, &planned)?;
         let Flown { layers: mut flights, mut grounded } = fly(planned, &task, &[], flyer)?;
-        let Sprayed { mut film, pixels, before: mut partly_painted } = spray(flights.iter().map(|f| &f.flight), &task)?;
+        let mut sprayed = spray(logs(&flights), &task)?;
         let mut looked = None;
         if task.settings.look && grounded.is_none() {
-            match touch_up(&mut task, &flights, &film, &pixels, flyer) {
+            match touch_up(&mut task, &flights, &sprayed.surface, flyer) {
                 Ok((again, figures)) => {
                     flights.extend(again.layers);
                     grounded = again.grounded;
                     // From the beginning, as the shots of one flight are batched.
-                    Sprayed { film, before: partly_painted, .. } = spray(flights.iter().map(|f| &f.flight), &task)?;
+                    sprayed = spray(logs(&flights), &task)?;
                     looked = Some(figures);
                 }
                 // How long painting again would have taken is not known.
                 Err(error) => grounded = Some(Grounded::by(&error, 0.0)),
             }
         }
+        let Sprayed { surface: DriedSurface { film, pixels, ran, waited, drying }, before: partly_painted } = sprayed;
         Ok(Self {
             task,
             flights,
             film,
             pixels,
+            ran,
+            ground_times: [waited, drying],
             partly_painted,
             planning,
             unreachable_paint,
@@ -153,4 +161,9 @@ impl Mission {
         let [pan, tilt] = sample.pan_tilt;
         self.task.robot.chain.link_poses(Joints { pan, tilt })
     }
+}
+
+/// The flights' logs, each with whether the paint before it is dry.
+fn logs(flights: &[LayerFlight]) -> impl Iterator<Item = (&FlightLog, bool)> {
+    flights.iter().map(|layer| (&layer.flight, layer.on_dry))
 }

@@ -214,6 +214,8 @@ mod tests {
                 flights,
                 film,
                 pixels,
+                ran: Vec::new(),
+                ground_times: [0.0; 2],
                 partly_painted: Vec::new(),
                 planning,
                 unreachable_paint,

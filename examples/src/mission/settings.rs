@@ -15,6 +15,7 @@ use super::planner_choice::PlannerChoice;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
 use crate::simulated_sensors::FaultInterval;
+use paint_sim::film::wet::Ground;
 use paint_sim::flight::{Airframe, Faults};
 use paint_sim::paint::PaintName;
 
@@ -33,6 +34,9 @@ pub struct MissionSettings {
     pub spot: f64,
     /// What is in the tank. Default charcoal.
     pub paint: PaintName,
+    /// How the wall soaks up the wet paint's solvent. Default sealed.
+    #[serde(skip_serializing_if = "is_sealed")]
+    pub ground: Ground,
     /// Where a picture lies.
     pub placement: PicturePlacement,
     /// From where the design is thrown onto the surface; `None` lays it over the chart.
@@ -119,6 +123,10 @@ fn is_level(pitch: &f64) -> bool {
     *pitch == 0.0
 }
 
+fn is_sealed(ground: &Ground) -> bool {
+    *ground == Ground::default()
+}
+
 fn usual_airframe(airframe: &Airframe) -> bool {
     *airframe == Airframe::default()
 }
@@ -155,6 +163,7 @@ impl Default for MissionSettings {
             texel: 0.0125,
             spot: 0.025,
             paint: PaintName::default(),
+            ground: Ground::default(),
             memory_gib: 8.0,
             placement: PicturePlacement::default(),
             viewpoint: None,

@@ -6,10 +6,10 @@ use paint_sim::{Film, Shot, Substrate, TriangleSurface};
 
 use super::error::MissionError;
 use super::mission_output::{page_colours, painted_view, texture};
-use super::nozzle::spray_model;
 use super::painted_mesh::save_painted_mesh;
 use super::painting_task::PaintingTask;
 use super::settings::MissionSettings;
+use super::wet_surface::WetSurface;
 use crate::paint_set::NamedPaint;
 use crate::progress::Stage;
 use crate::region::Scene;
@@ -20,9 +20,7 @@ const PICTURES: usize = 8;
 /// A surface with a film of one paint that grows shot by shot.
 pub struct SprayedFilm {
     task: PaintingTask,
-    film: Film,
-    /// Pixel of every texel of the film.
-    pixels: Vec<usize>,
+    surface: WetSurface,
 }
 
 impl SprayedFilm {
@@ -38,8 +36,7 @@ impl SprayedFilm {
         wall: &Substrate,
     ) -> Result<Self, MissionError> {
         let task = PaintingTask::undecided(name, scene, settings)?.with_paint(paint, wall)?;
-        let (texels, pixels) = task.film_texels();
-        Ok(Self { film: Film::new(texels)?, task, pixels })
+        Ok(Self { surface: WetSurface::new(&task)?, task })
     }
 
     /// Everything there is to hit.
@@ -53,34 +50,45 @@ impl SprayedFilm {
     /// Shots that the simulation refuses, a folder that cannot be written.
     pub fn spray(&mut self, shots: &[(f64, Shot)], duration: f64, folder: &Path) -> Result<(), MissionError> {
         let stage = Stage::start("spray");
-        let settings = &self.task.settings;
         let mut rest = shots;
         for k in 1..=PICTURES {
             let until = duration * k as f64 / PICTURES as f64;
             let count = if k == PICTURES { rest.len() } else { rest.partition_point(|(time, _)| *time <= until) };
             let (now, later) = rest.split_at(count);
-            let now: Vec<Shot> = now.iter().map(|(_, shot)| *shot).collect();
-            self.film.deposit(&now, &spray_model(settings), self.task.met(), settings.threads, &mut |_, _| ())?;
-            let depth = self.task.depth_of(&self.film, &self.pixels);
+            self.surface.spray(now, &self.task, &|_| ())?;
+            let depth = self.surface.depth(&self.task);
             texture(&self.task, &depth).save(&folder.join(format!("painted_{k}_of_{PICTURES}.png")))?;
             stage.share(k as f64 / PICTURES as f64);
             rest = later;
         }
+        self.surface.land(duration, true)?;
         stage.done(&format!("{} shots", shots.len()));
         Ok(())
     }
 
-    /// Paint that left the nozzle, that lies on the surface, and that met nothing, m³.
+    /// The paint.
+    fn film(&self) -> &Film {
+        self.surface.film().film()
+    }
+
+    /// Share by area of the painted surface from which paint has run.
+    pub fn share_ran(&self) -> f64 {
+        self.surface.film().share_ran()
+    }
+
+    /// Paint that left the nozzle, that lies on the surface, and that met nothing or dripped off, m³.
     pub fn volumes(&self) -> [f64; 3] {
-        let balance = self.film.mass_balance();
-        [balance.emitted, balance.deposited, balance.overspray].map(|quanta| quanta as f64 * paint_sim::spray::QUANTUM)
+        let balance = self.film().mass_balance();
+        [balance.emitted, balance.deposited, balance.overspray + balance.dripped]
+            .map(|quanta| quanta as f64 * paint_sim::spray::QUANTUM)
     }
 
     /// Mean thickness by area where there is paint, and the largest, metres.
     pub fn thickness(&self) -> [f64; 2] {
         let (mut volume, mut area, mut most) = (0.0, 0.0, 0.0_f64);
-        for (k, texel) in self.film.texels().iter().enumerate() {
-            let thickness = self.film.thickness(k);
+        let film = self.film();
+        for (k, texel) in film.texels().iter().enumerate() {
+            let thickness = film.thickness(k);
             if thickness > 0.0 {
                 (volume, area) = (volume + thickness * texel.area, area + texel.area);
                 most = most.max(thickness);
@@ -94,7 +102,7 @@ impl SprayedFilm {
     /// # Errors
     /// A folder that cannot be written.
     pub fn save(&self, folder: &Path) -> Result<(), MissionError> {
-        let depth = self.task.depth_of(&self.film, &self.pixels);
+        let depth = self.surface.depth(&self.task);
         texture(&self.task, &depth).save(&folder.join("painted.png"))?;
         save_painted_mesh(&self.task, &page_colours(&self.task, &depth), folder)?;
         Ok(painted_view(&self.task, &depth)?.save(&folder.join("painted_view.png"))?)

@@ -1,7 +1,6 @@
 //! Painting again what is missing: what was decided against what the robot sees.
 
 use paint_net::{Image, Painting};
-use paint_sim::Film;
 use paint_sim::film::inspection::FilmEstimate;
 
 use super::decide::decide;
@@ -12,6 +11,7 @@ use super::look::look;
 use super::painting_task::PaintingTask;
 use super::plan::plan;
 use super::settings::PainterChoice;
+use super::wet_surface::DriedSurface;
 use crate::appearance::UNIT_THICKNESS;
 
 /// Depth of paint below which nothing was meant to lie, and below which nothing is missing.
@@ -39,8 +39,7 @@ pub(super) struct TouchUpFigures {
 pub(super) fn touch_up(
     task: &mut PaintingTask,
     flights: &[LayerFlight],
-    film: &Film,
-    pixels: &[usize],
+    DriedSurface { film, pixels, .. }: &DriedSurface,
     flyer: &mut dyn Flyer,
 ) -> Result<(Flown, TouchUpFigures), MissionError> {
     let expected = expected_depth(task);
@@ -63,7 +62,7 @@ pub(super) fn touch_up(
         return Ok((Flown::default(), figures));
     }
     let wanted = missing.map(|depth| task.appearance.ink().forward(depth));
-    let decided = decide(&wanted, &task.coverage, &task.surface, &task.in_reach, &task.appearance, &task.settings);
+    let decided = decide(&wanted, task);
     let layers = match decided {
         Err(MissionError::NothingToPaint(_)) => return Ok((Flown::default(), figures)),
         other => other?,

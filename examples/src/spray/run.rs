@@ -58,6 +58,8 @@ pub struct SprayReport {
     pub thickness_mean_m: f64,
     /// Largest thickness.
     pub thickness_max_m: f64,
+    /// Share by area of the painted surface from which paint has run.
+    pub sagging_share: f64,
 }
 
 /// Does what the command line asks for.
@@ -74,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<(), SprayError> {
     let threads = arguments.threads.map_or(defaults.threads, usize::from);
     let settings = MissionSettings { texel: arguments.texel, spot: arguments.spot, threads, ..defaults };
     let wall = arguments.wall.substrate().map_err(crate::mission::MissionError::from)?;
-    let (paint_name, density) = (paint.name.clone(), paint.density);
+    let (paint_name, density) = (paint.name.clone(), paint.liquid.density);
     let mut sprayed = SprayedFilm::new(&name, &scene, settings, paint, &wall)?;
     let shots = motion.shots(SHOT_STEP);
     let (front, behind): (Vec<_>, Vec<_>) = shots.into_iter().partition(|(_, shot)| !is_behind(sprayed.world(), shot));
@@ -101,6 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<(), SprayError> {
         paint_overspray_kg: (balance[2] + lost) * density,
         thickness_mean_m: mean,
         thickness_max_m: max,
+        sagging_share: sprayed.share_ran(),
     };
     save_figures(&report, folder)?;
     say!(
@@ -111,6 +114,9 @@ pub fn run(arguments: &Arguments) -> Result<(), SprayError> {
         100.0 * report.paint_deposited_kg / report.paint_emitted_kg.max(f64::MIN_POSITIVE),
         1e6 * mean
     );
+    if report.sagging_share > 0.0 {
+        say!("{:.1} % of the painted surface was so thick that its paint ran", 100.0 * report.sagging_share);
+    }
     result!("{}", folder.join("painted_view.png").display());
     Ok(())
 }

@@ -112,6 +112,24 @@ fn each_paint_has_rows_of_its_own() {
     assert!(time("yellow") < 0.75 * time("blue"), "{found:?}");
 }
 
+/// A window in the middle of a picture stays clean, and the picture is as good as without it up to its frame.
+#[test]
+fn a_window_in_a_picture_stays_clean() {
+    let s = Scratch::new("window");
+    let mut mission = mission(&s, two_paints(&s).to_str().unwrap());
+    mission.settings.threads = 2;
+    mission.keep_clean = vec!["box:0.3,0.15,-1,0.5,0.35,1".parse().unwrap()];
+    let found = fly(&mission, &s.0.join("out"));
+    assert!((found.kept_clean_m2.unwrap() - 0.04).abs() < 0.006, "{found:?}");
+    // A spot has a deviation of 2.5 cm: a stroke that ended at the frame would soil a margin as wide, half of the window.
+    assert!(found.kept_clean_soiled_share.unwrap() < 0.3, "{found:?}");
+    let painted: f64 = found.paint_deposited_kg / 1200.0 / 0.36;
+    assert!(found.kept_clean_thickness_mean_m.unwrap() < 0.1 * painted, "{found:?}, {painted} elsewhere");
+    assert!(found.picture.unwrap().ciede2000_in_gamut_mean < 2.5);
+    let again = MissionFile::read(&s.0.join("out/mission.toml")).unwrap();
+    assert_eq!(again.keep_clean, mission.keep_clean);
+}
+
 /// Six paints can make any grey in many ways: each lies where it is needed, not all of them everywhere.
 #[test]
 fn a_grey_picture_does_not_take_all_paints_everywhere() {
@@ -143,7 +161,8 @@ fn a_picture_made_of_films_is_painted_in_them() {
     let blue = found.paints.iter().position(|name| name == "blue").unwrap();
     let litres = picture.paint_l_by_paint[blue];
     assert!(litres * 1e-3 * 0.5 * 1100.0 > found.paint_deposited_kg_by_paint[blue], "{litres} {found:?}");
-    assert!(found.mission_time_s > found.flight_time_s + 899.0);
+    // Thin films are dry before another tank is mounted.
+    assert!((found.mission_time_s - found.flight_time_s - 300.0).abs() < 1e-6);
     for file in ["wanted.png", "painted.png", "painted_view.png", "out_of_gamut.png", "report.json", "mission.toml"] {
         assert!(s.0.join("out").join(file).exists(), "{file} is missing");
     }

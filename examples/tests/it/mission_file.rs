@@ -34,6 +34,7 @@ fn a_mission_keeps_all_that_it_was_told() {
     settings.planner.timing.policy = TimingPolicy::GradientPreserving;
     settings.ptu.pan_limits.max = 1.25;
     settings.servo.dead_time = 0.07;
+    settings.ground.sorptivity = 1e-5;
     let told = MissionFile {
         mesh: Some(s.0.join("a.obj")),
         scale: Some(MeshScale::Factor(2.5)),
@@ -43,6 +44,7 @@ fn a_mission_keeps_all_that_it_was_told() {
         texture: Some(s.0.join("c.png")),
         scan: true,
         region: Some(Region::Mask(s.0.join("d.png"))),
+        keep_clean: vec![Region::Mask(s.0.join("h.png")), Region::Box([0.0, 0.0, 1.0, 1.0, 2.0, 3.0])],
         palette: Some(PaletteChoice::File(s.0.join("f.toml"))),
         available: Some(s.0.join("g.toml")),
         wall: Some(Wall::Colour([1, 2, 255])),

@@ -67,7 +67,7 @@ fn two_triangles_are_divided_at_the_border_and_nothing_tears() {
         ("plane:0,1.5,1,-2,0,0,0.5", std::f64::consts::PI * 0.25),
     ] {
         let finest = 0.0125;
-        let Scene { canvas, obstacles } = region(text).split(wall(), finest, 1.0).unwrap();
+        let Scene { canvas, obstacles, .. } = region(text).split(wall(), finest, 1.0).unwrap();
         let perimeter = 4.0;
         assert!((canvas.area() - area).abs() < finest * perimeter, "{text}: {}", canvas.area());
         assert!((canvas.area() + obstacles.area() - 6.0).abs() < 1e-5, "{text}");
@@ -87,6 +87,27 @@ fn two_triangles_are_divided_at_the_border_and_nothing_tears() {
     }
 }
 
+/// What stays clean is marked on the canvas, as large as its regions, however often the faces are divided.
+#[test]
+fn windows_are_marked_on_the_canvas() {
+    let finest = 0.0125;
+    let mut scene = Scene::whole(wall());
+    scene.keep_clean(&region("box:-1,1.2,0.6,1,2.1,1.6"), finest, 1.0).unwrap();
+    scene.keep_clean(&region("plane:0,0.6,1,-2,0,0,0.3"), finest, 1.0).unwrap();
+    let area = |wanted: bool| -> f64 {
+        let faces = scene.canvas.faces.iter().zip(&scene.clean).filter(|(_, clean)| **clean == wanted);
+        let part = TriangleMesh { faces: faces.map(|(face, _)| *face).collect(), ..scene.canvas.clone() };
+        part.area()
+    };
+    let closed = 0.9 + std::f64::consts::PI * 0.09;
+    assert!((area(true) - closed).abs() < finest * 6.0, "{} of {closed}", area(true));
+    assert!((area(true) + area(false) - 6.0).abs() < 1e-5 && scene.obstacles.faces.is_empty());
+    let nothing = scene.keep_clean(&region("box:5,5,5,6,6,6"), finest, 1.0).unwrap_err().to_string();
+    assert!(nothing.contains("holds nothing of the mesh"), "{nothing}");
+    let all = scene.keep_clean(&region("box:-9,-9,-9,9,9,9"), finest, 1.0).unwrap_err().to_string();
+    assert!(all.starts_with("--keep-clean box:") && all.contains("nothing of the mesh is left to paint"), "{all}");
+}
+
 /// Files double vertices along the seams of their textures: the two triangles share no vertex.
 #[test]
 fn faces_that_share_places_but_no_vertices_stay_together() {
@@ -98,7 +119,7 @@ fn faces_that_share_places_but_no_vertices_stay_together() {
         ..TriangleMesh::default()
     };
     // In the lower one alone, so that only it asks for a division of their common side.
-    let Scene { canvas, obstacles } = region("box:-1,0.3,0.2,1,1,0.8").split(torn, 0.05, 1.0).unwrap();
+    let Scene { canvas, obstacles, .. } = region("box:-1,0.3,0.2,1,1,0.8").split(torn, 0.05, 1.0).unwrap();
     assert!((border([&canvas, &obstacles]) - 10.0).abs() < 1e-4, "{}", border([&canvas, &obstacles]));
 }
 
@@ -229,7 +250,7 @@ fn a_cupboard_is_painted_in_its_kitchen() {
     // Floor, side wall and handle take their share of the reach.
     assert!((0.4..0.99).contains(&figures.reach_share), "{}", figures.reach_share);
     // By another account than the mission's own: the rotors keep clear of everything that the file holds.
-    let Scene { canvas, obstacles } = told.read_surface().unwrap().1;
+    let Scene { canvas, obstacles, .. } = told.read_surface().unwrap().1;
     let first = canvas.positions.len() as u32;
     let faces: Vec<[u32; 3]> =
         canvas.faces.iter().copied().chain(obstacles.faces.iter().map(|f| f.map(|i| i + first))).collect();

@@ -43,6 +43,22 @@ fn table(s: &Scratch, text: &str) -> Result<Value, SprayError> {
     sprayed(s, &s.path("pass.csv"), &["--mesh", &mesh, "--texel", "0.005"])
 }
 
+/// Four times as slow it is too thick to stay: as much paint, lower on the wall, with its runs in the report.
+#[test]
+fn too_slow_a_pass_runs_down() {
+    let s = Scratch::new("runs");
+    let slow = |k: usize, row: [f64; 8]| Some([0.4 * k as f64, row[1], row[2], row[3], 0.0, 1.0, 0.0, FLOW]);
+    let report = table(&s, &pass(&slow)).unwrap();
+    let figure = |name: &str| report[name].as_f64().unwrap();
+    assert!(figure("sagging_share") > 0.1, "{report}");
+    // It thins until it dries: fresh paint stays up to 3 / (1200 g) m, 0.35 of that when it is dry; what has dried before stays thicker.
+    let flat_out = 4.0 * FLOW / (0.2 * 0.025 * std::f64::consts::TAU.sqrt());
+    assert!(figure("thickness_max_m") < 0.75 * flat_out, "{report}");
+    let books = figure("paint_emitted_kg") - figure("paint_deposited_kg") - figure("paint_overspray_kg");
+    assert!(books.abs() < 1e-12, "{books}");
+    assert_eq!(table(&Scratch::new("stays"), &pass(&|_, row| Some(row))).unwrap()["sagging_share"], 0.0);
+}
+
 /// Along a straight pass the thickness in the middle is `Q / (v d tan(sigma) sqrt(2 pi))`, and no paint is lost.
 #[test]
 fn a_straight_pass_leaves_the_thickness_of_the_closed_form() {
