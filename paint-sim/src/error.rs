@@ -73,6 +73,30 @@ pub enum Error {
         /// The texel.
         texel: u32,
     },
+    /// A burst that left nothing to measure.
+    #[error("burst {burst} left hardly a reading that differs from the bare card: leave it out, or check its card")]
+    Unpainted {
+        /// Number of the burst, from 0.
+        burst: usize,
+    },
+    /// A burst so thick that its readings do not tell how thick.
+    #[error("most painted readings of burst {burst} hide the card: spray shorter, or from farther away")]
+    Saturated {
+        /// Number of the burst, from 0.
+        burst: usize,
+    },
+    /// Parameters that the data do not tell from one another.
+    #[error("the data do not determine {parameters}: hold one of them, or measure what tells them apart")]
+    Undetermined {
+        /// Their names.
+        parameters: String,
+    },
+    /// A fit that found no minimum.
+    #[error("the fit of {what} did not converge: check poses, durations and noise of the data")]
+    NoConvergence {
+        /// What was sought.
+        what: &'static str,
+    },
     /// The hose cannot reach the vehicle.
     #[error("a hose of {length:.3} m cannot span {distance:.3} m: lengthen it or move its base")]
     HoseTooShort {

@@ -35,6 +35,8 @@
 //! | source | equation | item |
 //! |---|---|---|
 //! | VR paper, Section IV (form ours) | conical Gaussian spray, per area and volume | [`SprayModel::density`] |
+//! | the same as an ellipse off the axis (ours) | aspect, turn, yaw, pitch of the jet | [`SprayModel::density_from`] |
+//! | Levenberg 1944, Marquardt 1963; derivatives and doubts: ours | spray and valve from photographed bursts | [`spray::calibration`] |
 //! | handheld paper, Section V (ours) | paint per texel, exact mass balance | [`Film::deposit`], [`film::MassBalance`] |
 //! | handheld paper, Eqs. (1), (6), (7) | required density, score of a step | [`droplets`] |
 //! | handheld paper, Section VI-B | hand, sensors, slide, valve | [`gantry_robot`] |
@@ -42,6 +44,7 @@
 //! | Kubelka-Munk 1931 | opaque film, Riccati equation | [`km::opaque_reflectance`], [`km::gradient`] |
 //! | Kubelka 1954 | layers on layers | [`km::Layer::over`] |
 //! | Kubelka 1948, solved for two grounds | `K` and `S` from a drawdown | [`Paint::from_drawdown`] |
+//! | least squares on the gradient (ours) | `K` and `S` from a chart of layers | [`Paint::from_chart`] |
 //! | Riccati's equation, film by film (ours) | colour of a stack of films and its derivatives | [`paint::FilmStack`] |
 //! | Jakob and Hanika 2019 | reflectance of a colour | [`colour::spectrum_of_linear_srgb`] |
 //! | pictures before and after (ours) | fall-off of the lens, light of the scene, thickness of the film | [`film::inspection`] |
@@ -71,6 +74,7 @@ pub mod film;
 pub mod flight;
 pub mod gantry_robot;
 pub mod km;
+mod least_squares;
 pub mod paint;
 pub mod render;
 mod rng;

@@ -1,6 +1,7 @@
 //! Paints and grounds with 36 bands: from the thickness of a film to the colour one sees.
 
 mod appearance;
+mod chart;
 mod drawdown;
 mod film_colours;
 mod film_stack;
@@ -8,6 +9,7 @@ mod named;
 mod pigments;
 
 pub use appearance::{Appearance, ink_curve};
+pub use chart::{ChartFit, Patch};
 pub use drawdown::Drawdown;
 pub use film_colours::FilmColours;
 pub use film_stack::{Bands, FilmStack, MOST_FILMS};

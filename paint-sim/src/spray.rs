@@ -1,8 +1,13 @@
 //! The spray cone: how the paint of one shot spreads over directions.
 
-use nalgebra::{Point3, UnitVector3, Vector3};
+pub mod calibration;
+mod ellipse;
+
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
 use crate::error::{Error, check_positive, check_range};
+pub(crate) use ellipse::SlopeEllipse;
+use ellipse::{EllipticCone, left_of};
 
 /// One quantum of paint in the mass balance: one femtolitre, in cubic metres.
 pub const QUANTUM: f64 = 1e-18;
@@ -11,6 +16,12 @@ pub const QUANTUM: f64 = 1e-18;
 /// and `s` the sideways offset per metre of depth along the axis.
 ///
 /// The cone model is the VR paper's (Section IV); it prints neither angle nor flow, so the defaults are engineering values.
+///
+/// With an aspect `a` the Gaussian has the deviations `t sqrt(a)` and `t / sqrt(a)` along the two sides of an ellipse, so the density in its
+/// middle does not depend on `a`; with yaw and pitch its middle lies at the slopes `tan(yaw)` to the left and `tan(pitch)` upwards. Left and up
+/// are the nozzle's. Where only an axis is known (a [`Shot`], [`SprayModel::density`]), the nozzle does not roll: left is horizontal, the world's
+/// z axis pointing up, and a vertical nozzle is one that was tilted there from the world's x axis. [`crate::droplets::Nozzle`] and
+/// [`SprayModel::density_from`] say themselves where up is. The defaults are round and on the axis, and need neither.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct SprayModel {
@@ -26,11 +37,29 @@ pub struct SprayModel {
     /// How far before a texel its shadow ray ends, m: larger than the roughness by which texels lie below the mesh.
     /// Default 1 mm.
     pub shadow_bias: f64,
+    /// Ratio of the two deviations, 0.05 to 20; below 1 the ellipse's first side is the short one. Default 1: a round spray.
+    pub aspect: f64,
+    /// Angle of the ellipse's first side, about the axis from the nozzle's left towards up, rad. Default 0.
+    pub turn: f64,
+    /// Angle of the jet from the nozzle's axis to the left, rad. Default 0.
+    pub yaw: f64,
+    /// Angle of the jet from the nozzle's axis upwards, rad. Default 0.
+    pub pitch: f64,
 }
 
 impl Default for SprayModel {
     fn default() -> Self {
-        Self { sigma: 8.0_f64.to_radians(), cut: 3.0, efficiency: 1.0, range: 1.0, shadow_bias: 1e-3 }
+        Self {
+            sigma: 8.0_f64.to_radians(),
+            cut: 3.0,
+            efficiency: 1.0,
+            range: 1.0,
+            shadow_bias: 1e-3,
+            aspect: 1.0,
+            turn: 0.0,
+            yaw: 0.0,
+            pitch: 0.0,
+        }
     }
 }
 
@@ -49,12 +78,34 @@ impl SprayModel {
         Cone::new(self, origin, axis).density(point, normal)
     }
 
+    /// The same of a nozzle whose frame is known (x along its axis, y left, z up), so that it may roll.
+    pub fn density_from(
+        &self,
+        world_from_nozzle: &Isometry3<f64>,
+        point: &Point3<f64>,
+        normal: &UnitVector3<f64>,
+    ) -> f64 {
+        let origin = Point3::from(world_from_nozzle.translation.vector);
+        let axis = world_from_nozzle.rotation * Vector3::x_axis();
+        let left = world_from_nozzle.rotation * Vector3::y();
+        Cone::with_left(self, &origin, &axis, || left).density(point, normal)
+    }
+
+    /// The cross-section of the jet.
+    pub(crate) fn ellipse(&self) -> SlopeEllipse {
+        SlopeEllipse::new(self.sigma.tan(), self.aspect, self.turn, [self.yaw, self.pitch])
+    }
+
     pub(crate) fn check(&self) -> Result<(), Error> {
         check_range("spray.sigma", self.sigma, 1e-4, 1.4, "an angle between 0.0001 and 1.4 rad")?;
         check_range("spray.cut", self.cut, 0.1, 100.0, "between 0.1 and 100 sigmas")?;
         check_range("spray.efficiency", self.efficiency, 0.0, 1.0, "between 0 and 1")?;
         check_positive("spray.range", self.range)?;
-        check_range("spray.shadow_bias", self.shadow_bias, 0.0, f64::MAX, "finite and not negative")
+        check_range("spray.shadow_bias", self.shadow_bias, 0.0, f64::MAX, "finite and not negative")?;
+        check_range("spray.aspect", self.aspect, 0.05, 20.0, "between 0.05 and 20")?;
+        check_range("spray.turn", self.turn, -1e3, 1e3, "an angle in radians")?;
+        check_range("spray.yaw", self.yaw, -1.4, 1.4, "an angle between -1.4 and 1.4 rad")?;
+        check_range("spray.pitch", self.pitch, -1.4, 1.4, "an angle between -1.4 and 1.4 rad")
     }
 }
 
@@ -78,26 +129,43 @@ pub(crate) struct Cone<'a> {
     /// Cosine of the half opening.
     pub(crate) cosine: f64,
     pub(crate) range: f64,
-    /// Slope deviation `t`.
+    /// Slope deviation, the smaller one of an ellipse.
     pub(crate) deviation: f64,
     exponent: f64,
     scale: f64,
+    /// What takes the place of the round cone where it is not round or not on the axis.
+    elliptic: Option<EllipticCone>,
 }
 
 impl<'a> Cone<'a> {
     pub(crate) fn new(spray: &SprayModel, origin: &'a Point3<f64>, axis: &'a UnitVector3<f64>) -> Self {
+        Self::with_left(spray, origin, axis, || left_of(axis))
+    }
+
+    fn with_left(
+        spray: &SprayModel,
+        origin: &'a Point3<f64>,
+        axis: &'a UnitVector3<f64>,
+        left: impl FnOnce() -> Vector3<f64>,
+    ) -> Self {
         let deviation = spray.sigma.tan();
         let slope = spray.cut * deviation;
         let kept = -(-0.5 * spray.cut * spray.cut).exp_m1();
+        let ellipse = spray.ellipse();
+        let around = || {
+            let left = left();
+            ellipse.around(&left, &axis.cross(&left), spray.cut)
+        };
         Self {
             origin,
             axis: axis.as_ref(),
             slope,
             cosine: 1.0 / (1.0 + slope * slope).sqrt(),
             range: spray.range,
-            deviation,
+            deviation: ellipse.deviations[0].min(ellipse.deviations[1]),
             exponent: -0.5 / (deviation * deviation),
             scale: spray.efficiency / (std::f64::consts::TAU * deviation * deviation * kept),
+            elliptic: (!ellipse.is_plain()).then(around),
         }
     }
 
@@ -109,11 +177,13 @@ impl<'a> Cone<'a> {
         if !(depth > 0.0 && depth <= self.range && facing > 0.0) {
             return 0.0;
         }
-        let slope_squared = (ray / depth - self.axis).norm_squared();
-        if slope_squared > self.slope * self.slope {
-            return 0.0;
-        }
-        self.scale * (self.exponent * slope_squared).exp() * facing / (depth * depth * depth)
+        let exponent = if let Some(cone) = &self.elliptic {
+            cone.squared(&(ray / depth)).map(|square| -0.5 * square)
+        } else {
+            let slope_squared = (ray / depth - self.axis).norm_squared();
+            (slope_squared <= self.slope * self.slope).then_some(self.exponent * slope_squared)
+        };
+        exponent.map_or(0.0, |exponent| self.scale * exponent.exp() * facing / (depth * depth * depth))
     }
 
     /// Whether a ball may touch the cone; never false when it does.
@@ -122,6 +192,9 @@ impl<'a> Cone<'a> {
         let depth = ray.dot(self.axis);
         if depth < -radius || depth > self.range + radius {
             return false;
+        }
+        if let Some(cone) = &self.elliptic {
+            return cone.may_intersect(&ray, depth, radius);
         }
         let sideways = (ray - self.axis * depth).norm();
         (sideways - self.slope * depth) * self.cosine <= radius

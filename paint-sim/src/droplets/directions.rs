@@ -1,4 +1,4 @@
-//! The directions of the droplets: a Gaussian in slope space, evenly filled.
+//! The directions of the droplets: a Gaussian in slope space, round or elliptic, evenly filled.
 
 use crate::error::{Error, check_range};
 use crate::spray::SprayModel;
@@ -20,13 +20,14 @@ pub(super) struct Block {
 
 /// A set of droplets that leave the nozzle at once, each with the same share of the paint.
 ///
-/// Their slopes follow the Gaussian of a [`SprayModel`] inside its cone, by the inverse of its distribution over a sequence of low
-/// discrepancy. The same number is the same set, and sets of consecutive numbers fill one another's gaps.
+/// Their slopes, to the left and upwards of the [`Nozzle`](super::Nozzle), follow the Gaussian of a [`SprayModel`] inside its cone, by the
+/// inverse of its distribution over a sequence of low discrepancy. The same number is the same set, and sets of consecutive numbers fill one
+/// another's gaps.
 #[derive(Debug, Clone)]
 pub struct Droplets {
     pub(super) blocks: Vec<Block>,
     pub(super) range: f64,
-    /// Tangent of the half opening.
+    /// Tangent of the half opening of a cone around the nozzle's axis that holds them all.
     pub(super) slope: f64,
 }
 
@@ -43,18 +44,19 @@ impl Droplets {
         }
         check_range("number of the droplet set", number as f64, 0.0, 1e9, "at most 1e9")?;
         let (deviation, kept) = (spray.sigma.tan(), -(-0.5 * spray.cut * spray.cut).exp_m1());
+        let ellipse = spray.ellipse();
         let mut slopes: Vec<[f32; 2]> = (0..count as u64)
             .map(|k| {
                 let at = (number * count as u64 + k) as f64 + 1.0;
                 let [u, v] = STEPS.map(|step| (0.5 + at * step).fract());
                 let radius = deviation * (-2.0 * (-u * kept).ln_1p()).sqrt();
                 let (sine, cosine) = (std::f64::consts::TAU * v).sin_cos();
-                [(radius * cosine) as f32, (radius * sine) as f32]
+                ellipse.shaped([radius * cosine, radius * sine]).map(|slope| slope as f32)
             })
             .collect();
         group(&mut slopes);
         let blocks = slopes.as_chunks::<BLOCK>().0.iter().map(Block::new).collect();
-        Ok(Self { blocks, range: spray.range, slope: spray.cut * deviation })
+        Ok(Self { blocks, range: spray.range, slope: ellipse.steepest(spray.cut) })
     }
 
     /// Sets 0 to `number - 1`: time steps in a row take them in turns.

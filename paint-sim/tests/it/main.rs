@@ -1,6 +1,7 @@
 //! What the crate promises, seen from outside. `own_*`: what each trait asks of whoever brings his own.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 
+mod chart;
 mod colour;
 mod deposit;
 mod droplets;
@@ -18,5 +19,7 @@ mod own_pan_tilt;
 mod own_reference;
 mod own_surface;
 mod render;
+mod spray_calibration;
+mod spray_shape;
 mod surface;
 mod wet;
