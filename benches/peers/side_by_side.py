@@ -150,6 +150,20 @@ def films(ours, _):
     yield "CIEDE2000 of 300000 pairs", f"colour-science {version('colour-science')}", b["cpu_ms"], a["cpu_ms"], ""
 
 
+def calibrations(ours, folder):
+    data = os.path.join(folder, "calibration")
+    mine = lines([ours, "calibration", data, "--runs", "1"])
+    theirs = lines(script("calibration_peers.py", data, "--runs", "1"))
+    for fig, what, key in (
+        ("spray_calibration", "spray from five bursts; 98415 readings", "flow"),
+        ("layer_chart", "absorption and scattering of 36 bands from a chart", "scattering_sum"),
+    ):
+        a = named(mine, fig)
+        for b in (line for line in theirs if line["fig"] == fig):
+            said = f"{key.replace('_', ' ')} within {abs(a[key] / b[key] - 1):.0e}"
+            yield what, f"scipy {version('scipy')}; {b['jac']} Jacobian", b["cpu_ms"], a["cpu_ms"], said
+
+
 def painters(ours, folder):
     five = os.path.join(folder, "five")
     if not os.path.isdir(five):
@@ -187,7 +201,7 @@ def main():
         subprocess.run(build, cwd=ROOT, check=True)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for job in (charts, atlases, programs, trajectories, graphs, films, painters, maps):
+        for job in (charts, atlases, programs, trajectories, graphs, films, calibrations, painters, maps):
             if o.only not in job.__name__:
                 continue
             rounds = [list(job(ours, folder)) for _ in range(max(1, o.rounds))]

@@ -1,5 +1,6 @@
 //! What the benches share: scenes of the size of the built-in world, seeded and built in memory, and criterion's settings.
 
+pub mod calibration;
 pub mod colours;
 pub mod control;
 pub mod cpu;

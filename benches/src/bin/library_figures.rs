@@ -14,7 +14,8 @@ use paintcopter::mesh_io::read_mesh;
 use paintcopter::world::rock_wall;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
 use paintcopter_benches::{
-    Rng, colours, control, films, fuzzed_meshes, motion, painting, planner, pose_graphs, room, split_meshes, vocabulary,
+    Rng, calibration, colours, control, films, fuzzed_meshes, motion, painting, planner, pose_graphs, room,
+    split_meshes, vocabulary,
 };
 use serde_json::json;
 use uv_param::cut::CutSettings;
@@ -99,6 +100,14 @@ enum Job {
         /// Films, and colours
         #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
         count: u32,
+        /// Runs of which the median is printed
+        #[arg(long, default_value_t = 5)]
+        runs: usize,
+    },
+    /// Calibrates a spray from bursts and a paint from a chart, and writes both for `calibration_peers.py`
+    Calibration {
+        /// Folder to write into
+        folder: PathBuf,
         /// Runs of which the median is printed
         #[arg(long, default_value_t = 5)]
         runs: usize,
@@ -193,6 +202,7 @@ fn main() -> ExitCode {
         }
         Job::Paint { image, size, runs, passes: None } => painting::run(&image, size.into(), runs),
         Job::Colour { image, runs } => colours::run(&image, runs),
+        Job::Calibration { folder, runs } => calibration::run(&folder, runs),
         Job::Sim { count, runs } => sim(count as usize, runs),
         Job::Tsdf { stream, voxel, frames, threads, no_colour, out } => {
             tsdf(&stream, voxel, frames, threads.into(), !no_colour, out.as_deref())

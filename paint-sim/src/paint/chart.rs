@@ -148,7 +148,8 @@ impl BandFit<'_> {
     }
 
     fn fit(&self) -> Result<Minimum<2>, Error> {
-        // The sum of squares has flat parts, where one coefficient vanishes beside the other, and a narrow bend between them: one start is not enough.
+        // The sum of squares has flat parts, where one coefficient vanishes beside the other, and a narrow bend between them: one start is
+        // not enough.
         let place = |i: usize| 10.0_f64.powf(DECADES * (i as f64 / (GRID - 1) as f64 - 0.5));
         let best_of = |i: usize| {
             let costs = (0..GRID).map(|j| (self.cost([place(i), place(j)]), [place(i), place(j)]));
