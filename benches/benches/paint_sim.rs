@@ -169,7 +169,7 @@ fn picture(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
     let size = (640, 480);
     let (eye, middle) = (Point3::new(-5.0, 0.5, 2.6), Point3::new(0.0, 0.0, 2.6));
     let camera = Camera::looking_at(&eye, &middle, &Vector3::z(), 1.0, size)?;
-    let shade = |hit: &Hit| Shading { albedo: [0.5; 3], normal: hit.normal };
+    let shade = |hit: &Hit| Shading::matt([0.5; 3], hit.normal);
     let lights = Lights::default();
     render(&surface.world, &camera, &shade, &lights, 1, 1)?;
     group.throughput(Throughput::Elements(u64::from(size.0 * size.1)));

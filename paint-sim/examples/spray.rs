@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let [i, j] = [1, 2]
             .map(|k| (1.0 - a - b) * f64::from(face[0][k]) + a * f64::from(face[1][k]) + b * f64::from(face[2][k]));
         let [i, j] = [i, j].map(|c| (((c + 0.2) / TEXEL) as usize).min(SIDE - 1));
-        Shading { albedo: albedo[j * SIDE + i].map(|c| c as f32), normal: hit.normal }
+        Shading::matt(albedo[j * SIDE + i].map(|c| c as f32), hit.normal)
     };
     let picture = render(&wall, &camera, &shade, &Lights::default(), 2, 1)?;
     let path = std::env::temp_dir().join("spray.ppm");

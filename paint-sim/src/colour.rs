@@ -29,6 +29,23 @@ pub fn xyz(reflectance: &Spectrum) -> [f64; 3] {
     sum.map(|total| total / white)
 }
 
+/// Tristimulus values of light that has a spectrum per nm: the plain sum over the bands, 10 nm each; times 683 lm/W they are luminous.
+pub fn emission_xyz(power: &Spectrum) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for (power, observer) in power.iter().zip(&tables::OBSERVER) {
+        for (total, weight) in sum.iter_mut().zip(observer) {
+            *total += 10.0 * power * weight;
+        }
+    }
+    sum
+}
+
+/// Linear sRGB of [`emission_xyz`], the bands' own D65 scaled to [`WHITE`]. Not clipped: light may be outside of the gamut of sRGB.
+pub fn linear_srgb_of_emission(power: &Spectrum) -> [f64; 3] {
+    let (values, white) = (emission_xyz(power), band_white());
+    linear_srgb(std::array::from_fn(|i| values[i] / white[i] * WHITE[i]))
+}
+
 /// [`xyz`] of the perfect white.
 pub fn band_white() -> [f64; 3] {
     xyz(&[1.0; BANDS])

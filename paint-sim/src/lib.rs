@@ -56,6 +56,12 @@
 //! | Saunderson 1942 | the air above the paint | [`km::saunderson`] |
 //! | CIE 015, IEC 61966-2-1 | XYZ, CIELAB, sRGB of 36 bands | [`colour`] |
 //! | Sharma, Wu, Dalal 2005 | colour difference CIEDE2000 | [`colour::ciede2000`] |
+//! | Astronomical Almanac, Michalsky 1988 | where the sun stands | [`render::SunPosition`] |
+//! | Preetham, Shirley, Smits 1999 | sunlight through the air, clear sky | [`render::sunlight`], [`render::Sky::clear`] |
+//! | CIE S 011, Moon and Spencer 1942 | covered sky | [`render::Sky::overcast`] |
+//! | Ramamoorthi and Hanrahan 2001, Eqs. (8), (10) | light of a sky on a surface | [`render::Sky::on_white`] |
+//! | Planck | light of a colour temperature | [`render::black_body`] |
+//! | Walter et al. 2007; Kelemen and Szirmay-Kalos 2001 | gloss over the paint | [`render::Coat`] |
 //! | Paper II, Section 5.2 (roll and pitch), linear drag | first-order attitude, rotor drag | [`flight::Vehicle::step`] |
 //! | rigid body with motor lag (textbook; PX4's thrust curve) | motor-level vehicle and its sensors | [`flight::multirotor`] |
 //! | catenary (textbook) | hose force | [`flight::HoseModel::force`] |

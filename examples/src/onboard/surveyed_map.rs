@@ -35,8 +35,14 @@ pub fn surveyed_map(
     // Looks along x, z up.
     let body_from_camera =
         UnitQuaternion::from_euler_angles(-std::f64::consts::FRAC_PI_2, 0.0, -std::f64::consts::FRAC_PI_2);
-    let lights = Lights { towards_sun: Vector3::z_axis(), sun: [0.0; 3], ambient: [1.0; 3], background: [0.0; 3] };
-    let shade = |hit: &Hit| Shading { albedo: [0.5; 3], normal: hit.normal };
+    let lights = Lights {
+        towards_sun: Vector3::z_axis(),
+        sun: [0.0; 3],
+        ambient: [1.0; 3],
+        background: [0.0; 3],
+        ..Lights::default()
+    };
+    let shade = |hit: &Hit| Shading::matt([0.5; 3], hit.normal);
     for k in 0..=(route.duration() / BETWEEN) as usize {
         let state = route.at(BETWEEN * k as f64);
         let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), state.heading) * body_from_camera;

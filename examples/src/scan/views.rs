@@ -64,7 +64,7 @@ fn shading(mesh: &Mesh, hit: &Hit, lamp: Option<&Vector3<f64>>) -> Shading {
         None => blend(&|v| mesh.colours[v].map(linear)),
         Some(lamp) => [(0.05 + 0.75 * normal.dot(lamp).max(0.0)) as f32; 3],
     };
-    Shading { albedo, normal }
+    Shading::matt(albedo, normal)
 }
 
 /// Linear light of an 8-bit sRGB value.

@@ -59,7 +59,7 @@ fn save_picture(scan: &ScanFlight, path: &Path) -> Result<(), MissionError> {
     let camera = Camera::looking_at(&eye.into(), &(middle + ahead * 0.7).into(), &Vector3::z(), 1.05, VIEW)?;
     let towards_sun = UnitVector3::new_normalize(Vector3::z() - ahead * 0.6 - aside);
     let lights = Lights { towards_sun, ..Lights::default() };
-    let shade = |hit: &Hit| Shading { albedo: [0.62, 0.56, 0.5], normal: hit.normal };
+    let shade = |hit: &Hit| Shading::matt([0.62, 0.56, 0.5], hit.normal);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let frame = render(&surface, &camera, &shade, &lights, 2, threads)?;
     let project = |p: &Point3<f64>| {

@@ -83,7 +83,8 @@ impl<'a> SimulatedCamera<'a> {
     pub fn new(surface: &'a TriangleSurface, towards: Vector3<f64>, seed: u64, threads: usize) -> Self {
         // Light from everywhere; the sun is behind the surface and costs no shadows.
         let towards_sun = UnitVector3::new_normalize(towards);
-        let lights = Lights { towards_sun, sun: [0.0; 3], ambient: [1.0; 3], background: [0.2; 3] };
+        let lights =
+            Lights { towards_sun, sun: [0.0; 3], ambient: [1.0; 3], background: [0.2; 3], ..Lights::default() };
         Self { camera: camera(), surface, lights, seed, threads, paint: None }
     }
 
@@ -117,7 +118,7 @@ impl<'a> SimulatedCamera<'a> {
         if let Some(paint) = &mut self.paint {
             paint.land(self.surface, self.threads)?;
         }
-        let shade = |hit: &Hit| Shading { albedo: [self.albedo(hit) as f32; 3], normal: hit.normal };
+        let shade = |hit: &Hit| Shading::matt([self.albedo(hit) as f32; 3], hit.normal);
         let mut frame = self.render(world_from_camera, &shade)?;
         let grey = frame.colour.iter().enumerate().map(|(pixel, colour)| {
             let noisy = f64::from(colour[0]) + GREY_NOISE * self.noise(2 * index, pixel);

@@ -116,7 +116,7 @@ fn view(session: &Session, atlas: &Patch) -> Result<Rgb, VrError> {
 fn shading(session: &Session, atlas: &Patch, hit: &Hit) -> Shading {
     let surface = &session.world().surface;
     if hit.face as usize >= surface.disk().faces().len() {
-        return Shading { albedo: [0.4; 3], normal: hit.normal };
+        return Shading::matt([0.4; 3], hit.normal);
     }
     let [a, b] = hit.barycentric;
     let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
@@ -126,5 +126,5 @@ fn shading(session: &Session, atlas: &Patch, hit: &Hit) -> Shading {
         let first = 3 * (row * surface.width() + column);
         [0, 1, 2].map(|k| decode_srgb8(atlas.rgb[first + k]) as f32)
     });
-    Shading { albedo, normal }
+    Shading::matt(albedo, normal)
 }

@@ -3,12 +3,14 @@
 use nalgebra::{Point3, Vector3};
 
 use super::camera::Camera;
-use super::lights::{Lights, Shading};
+use super::lights::Lights;
+use super::seen::Seen;
+use super::shading::Shading;
 use crate::colour::encode_srgb8;
 use crate::surface::{Hit, Surface};
 
 /// Rays end here, m: beyond it there is only background.
-const MAX_RAY_LENGTH: f64 = 1e4;
+pub(super) const MAX_RAY_LENGTH: f64 = 1e4;
 /// Rays along the edge of a tile: few triangles are in so narrow a pyramid, and many rays share them.
 const TILE: u32 = 8;
 
@@ -20,6 +22,8 @@ pub(super) struct Band<'a> {
     pub(super) depth: &'a mut [f32],
     pub(super) faces: &'a mut [u32],
     pub(super) normals: &'a mut [[f32; 3]],
+    /// Pixels with more light than they can show.
+    pub(super) clipped: usize,
 }
 
 pub(super) struct BandRenderer<'a> {
@@ -77,6 +81,7 @@ impl BandRenderer<'_> {
                 let linear =
                     if self.supersampling == 1 { self.light(hit.as_ref(), direction) } else { self.mean(&samples, k) };
                 band.colour[at] = linear.map(|v| encode_srgb8(f64::from(v)).0);
+                band.clipped += usize::from(linear.iter().any(|v| *v > 1.0));
             }
         }
     }
@@ -106,21 +111,13 @@ impl BandRenderer<'_> {
     }
 
     fn light(&self, hit: Option<&Hit>, direction: &Vector3<f64>) -> [f32; 3] {
-        let Some(hit) = hit else { return self.lights.background };
-        let Shading { albedo, normal: shading } = (self.shade)(hit);
+        let Some(hit) = hit else { return self.lights.background(direction) };
+        let eye = self.camera.world_from_camera.translation.vector;
         let normal = facing(hit, direction);
-        let towards_sun = self.lights.towards_sun.as_ref();
-        let lit_side = if shading.dot(&normal) < 0.0 { -shading } else { shading };
-        let mut cosine = lit_side.dot(towards_sun).max(0.0) as f32;
-        if cosine > 0.0 {
-            let eye = self.camera.world_from_camera.translation.vector;
-            // Off the surface by more than the rounding of the hit, or it would shade itself.
-            let start = Point3::from(eye + direction * hit.distance + normal * (1e-6 * (1.0 + hit.distance)));
-            if self.surface.occluded(&start, towards_sun, MAX_RAY_LENGTH) {
-                cosine = 0.0;
-            }
-        }
-        std::array::from_fn(|c| albedo[c] * (self.lights.sun[c] * cosine + self.lights.ambient[c]))
+        // Off the surface by more than the rounding of the hit, or it would shade itself.
+        let point = Point3::from(eye + direction * hit.distance + normal * (1e-6 * (1.0 + hit.distance)));
+        let seen = Seen { point, normal, towards_eye: -direction, shading: (self.shade)(hit) };
+        seen.light(self.surface, self.lights)
     }
 }
 

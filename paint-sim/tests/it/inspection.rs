@@ -81,7 +81,7 @@ impl Scene<'_> {
 
     /// What the camera writes down, as linear light.
     fn picture(&self, index: u64, camera: &Camera) -> Vec<f32> {
-        let shade = |hit: &Hit| Shading { albedo: [self.albedo(hit) as f32; 3], normal: hit.normal };
+        let shade = |hit: &Hit| Shading::matt([self.albedo(hit) as f32; 3], hit.normal);
         let frame = render(self.wall, camera, &shade, &self.lights, 1, 2).unwrap();
         let linear = |srgb: u8| decode_srgb8(srgb);
         let levels: Vec<f64> = (0..=255).map(linear).collect();
@@ -181,7 +181,7 @@ fn the_film_is_told_from_pictures_in_low_sun() {
     let paint = GreyPaint::at(&PaintName::Charcoal.paint(UNIT).unwrap(), 550.0);
     // Fifteen degrees above the horizon, from far aside: relief throws shadows.
     let low = lights(Vector3::new(-0.6, 0.9, 0.29));
-    let scene = Scene { wall: &wall, film: &film.layer(), paint, lights: low, exposure: 0.9, seed: 5 };
+    let scene = Scene { wall: &wall, film: &film.layer(), paint, lights: low.clone(), exposure: 0.9, seed: 5 };
     let before = scene.mosaic(&texels);
     let sun_moved = lights(Vector3::new(-0.7, 0.8, 0.35));
     for (name, lights, most) in [("same sun", low, 0.1), ("later", sun_moved, 0.15)] {

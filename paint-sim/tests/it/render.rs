@@ -17,11 +17,12 @@ fn lights() -> Lights {
         sun: [0.5, 0.25, 0.125],
         ambient: [0.25; 3],
         background: [0.0, 0.0, 1.0],
+        ..Lights::default()
     }
 }
 
 fn white(hit: &Hit) -> Shading {
-    Shading { albedo: [1.0; 3], normal: hit.normal }
+    Shading::matt([1.0; 3], hit.normal)
 }
 
 /// Two triangles through z = 2 + slope x, far larger than the picture.
@@ -49,6 +50,28 @@ fn depth_of_a_plane_is_z_and_not_the_length_of_the_ray() {
     let cosine = -expected.z;
     let code = |sun: f64| encode_srgb8(sun * cosine + 0.25).0;
     assert!(frame.colour.iter().all(|c| *c == [code(0.5), code(0.25), code(0.125)]));
+}
+
+/// In the default lights, exposed by 1: `albedo * (0.7 cos + 0.3)`, and the background beside it.
+#[test]
+fn the_usual_lights_are_a_sun_and_even_light() {
+    let lights = Lights::default();
+    let corners = [[-0.5, -0.5, -2.0], [0.5, -0.5, -2.0], [0.5, 0.5, -2.0], [-0.5, 0.5, -2.0]];
+    let wall = TriangleSurface::new(&corners, &[[0, 1, 2], [0, 2, 3]]).unwrap();
+    let seen = |normal: Vector3<f64>| {
+        let shade = |_: &Hit| Shading::matt([1.0, 0.5, 0.25], normal);
+        let from_above = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
+        let camera = Camera { world_from_camera: from_above, ..camera(65, 49) };
+        render(&wall, &camera, &shade, &lights, 1, 1).unwrap()
+    };
+    // Towards the eye, to which the sun is near; and away from the sun.
+    for normal in [Vector3::z(), Vector3::new(-0.8, 0.5, 0.3).normalize()] {
+        let frame = seen(normal);
+        let lit = 0.7 * normal.dot(&Vector3::new(0.3, -0.4, 0.87).normalize()).max(0.0) + 0.3;
+        assert_eq!(frame.colour[24 * 65 + 32], [lit, 0.5 * lit, 0.25 * lit].map(|v| encode_srgb8(v).0));
+        assert_eq!(frame.colour[0], [0.85, 0.9, 1.0].map(|v| encode_srgb8(v).0));
+        assert_eq!(frame.clipped, 0);
+    }
 }
 
 #[test]
@@ -162,7 +185,7 @@ fn a_camera_looks_at_its_target() {
 #[test]
 fn light_follows_the_normal_of_the_look() {
     // A plane that faces the camera, told to lean 60 degrees away from the sun behind the camera: half the light.
-    let sun = Lights { towards_sun: -Vector3::z_axis(), sun: [0.5; 3], ambient: [0.0; 3], background: [0.0; 3] };
+    let sun = Lights { towards_sun: -Vector3::z_axis(), sun: [0.5; 3], ambient: [0.0; 3], ..Lights::default() };
     let leaning = |hit: &Hit| Shading { normal: Vector3::new(0.75_f64.sqrt(), 0.0, -0.5), ..white(hit) };
     let level = |shade: &(dyn Fn(&Hit) -> Shading + Sync)| {
         let frame = render(&slanted(0.0), &camera(9, 9), shade, &sun, 1, 1).unwrap();

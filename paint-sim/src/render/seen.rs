@@ -1,0 +1,64 @@
+//! The light that leaves a point of the surface towards the eye.
+
+use nalgebra::{Point3, Vector3};
+
+use super::band::MAX_RAY_LENGTH;
+use super::coat::Coat;
+use super::lights::Lights;
+use super::shading::Shading;
+use crate::surface::Surface;
+
+/// A point that the camera sees.
+pub(super) struct Seen {
+    /// A little off the surface, where its shadow rays begin.
+    pub(super) point: Point3<f64>,
+    /// Of the geometry, on the side of the eye.
+    pub(super) normal: Vector3<f64>,
+    pub(super) towards_eye: Vector3<f64>,
+    pub(super) shading: Shading,
+}
+
+impl Seen {
+    /// Sun and lamps unless something stands before them; sky and ambient light as if nothing did.
+    pub(super) fn light(&self, surface: &dyn Surface, lights: &Lights) -> [f32; 3] {
+        let Shading { albedo, normal, coat } = &self.shading;
+        let normal = if normal.dot(&self.normal) < 0.0 { -normal } else { *normal };
+        let lit = |towards: &Vector3<f64>, distance: f64| {
+            let cosine = normal.dot(towards);
+            if cosine > 0.0 && !surface.occluded(&self.point, towards, distance) { cosine } else { 0.0 }
+        };
+        // Of one light: the shares that paint and coat send to the eye.
+        let shares = |towards: &Vector3<f64>, distance: f64| match (lit(towards, distance), coat) {
+            (0.0, _) => [0.0; 2],
+            (cosine, None) => [cosine as f32, 0.0],
+            (_, Some(coat)) => coat.reflected(&normal, &self.towards_eye, towards).map(|share| share as f32),
+        };
+        // A sun without light needs no shadow ray.
+        let sunny = lights.sun.iter().any(|c| *c != 0.0);
+        let [matt, gloss] = if sunny { shares(lights.towards_sun.as_ref(), MAX_RAY_LENGTH) } else { [0.0; 2] };
+        let mut on_paint: [f32; 3] = std::array::from_fn(|c| lights.sun[c] * matt);
+        let mut off_coat = lights.sun.map(|sun| sun * gloss);
+        for lamp in &lights.lamps {
+            let Some((towards, distance, light)) = lamp.seen_from(&self.point) else { continue };
+            let [matt, gloss] = shares(&towards, distance);
+            on_paint = std::array::from_fn(|c| on_paint[c] + light[c] * matt);
+            off_coat = std::array::from_fn(|c| off_coat[c] + light[c] * gloss);
+        }
+        let mut around = lights.around(&normal);
+        if let Some(coat) = coat {
+            let share = coat.albedo(normal.dot(&self.towards_eye)) as f32;
+            let mirrored = self.mirrored(*coat, &normal, lights);
+            around = around.map(|light| (1.0 - share) * light);
+            off_coat = std::array::from_fn(|c| off_coat[c] + share * mirrored[c]);
+        }
+        std::array::from_fn(|c| lights.exposure * (albedo[c] * (on_paint[c] + around[c]) + off_coat[c]))
+    }
+
+    /// What a coat mirrors of the surroundings: the rougher it is, the more of their mean about that direction.
+    fn mirrored(&self, coat: Coat, normal: &Vector3<f64>, lights: &Lights) -> [f32; 3] {
+        let direction = 2.0 * normal.dot(&self.towards_eye) * normal - self.towards_eye;
+        let (sharp, even) = (lights.from(&direction), lights.around(&direction));
+        let roughness = coat.roughness() as f32;
+        std::array::from_fn(|c| sharp[c] + roughness * (even[c] - sharp[c]))
+    }
+}
