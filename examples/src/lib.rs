@@ -14,6 +14,7 @@ pub mod exit;
 #[cfg(feature = "handheld")]
 pub mod handheld;
 pub mod interruption;
+pub mod light;
 #[cfg(feature = "log")]
 mod log;
 #[cfg_attr(not(feature = "programs"), allow(dead_code, reason = "each program reads and writes some of the messages"))]
@@ -62,6 +63,7 @@ pub mod socket_address;
 pub mod spray;
 mod srgb;
 pub mod surface;
+pub mod surroundings;
 pub mod textured_mesh;
 #[cfg(feature = "unwrap")]
 pub mod unwrap;

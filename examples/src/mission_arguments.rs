@@ -2,6 +2,7 @@
 
 mod nozzle;
 mod positive;
+mod showing;
 mod vehicle;
 
 use std::path::PathBuf;
@@ -21,6 +22,7 @@ use crate::wall::Wall;
 
 use nozzle::Nozzle;
 use positive::positive;
+pub use showing::ShowingArguments;
 use vehicle::Vehicle;
 
 type AnyError = Box<dyn std::error::Error>;
@@ -92,6 +94,8 @@ pub struct MissionArguments {
     layers: Option<LayersName>,
     #[command(flatten)]
     nozzle: Nozzle,
+    #[command(flatten)]
+    showing: ShowingArguments,
     /// Seed of the world, the wind and the errors [default: 1]
     #[arg(long)]
     seed: Option<u64>,
@@ -289,6 +293,7 @@ impl MissionArguments {
         settings.viewpoint = self.placement.project.or(settings.viewpoint);
         self.placement.apply(&mut settings.placement);
         self.nozzle.apply(settings);
+        self.showing.apply(&mut settings.show);
         Ok(mission)
     }
 
@@ -389,6 +394,13 @@ mod tests {
         assert_eq!(mission(&[]).unwrap(), MissionFile::default());
         let cut = mission(&["--tank=0.5", "--battery=6", "--identify"]).unwrap().settings;
         assert_eq!((cut.endurance.tank, cut.endurance.battery, cut.identify), (Some(5e-4), Some(360.0), true));
+        let shown = mission(&["--light=18:30@47.4", "--gloss=0.2", "--turntable=8"]).unwrap();
+        assert_eq!((shown.settings.show.gloss, shown.settings.show.turntable), (Some(0.2), Some(8)));
+        shown.write(&file).unwrap();
+        assert!(std::fs::read_to_string(&file).unwrap().contains("light = \"2026-06-21T18:30@47.4\""));
+        assert_eq!(mission(&["--mission", path]).unwrap(), shown);
+        assert!(mission(&["--light=night"]).unwrap_err().contains("noon, dusk, lamp, overcast"));
+        assert!(mission(&["--gloss=0"]).is_err() && mission(&["--turntable=0"]).is_err());
         let locked = mission(&["--planner=smoothing-locked"]).unwrap();
         assert_eq!(locked.settings.path_planner, PlannerChoice::SmoothingLocked);
         locked.write(&file).unwrap();

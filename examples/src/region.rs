@@ -260,22 +260,25 @@ fn sides(corners: &[f64; 6]) -> ([f64; 3], [f64; 3]) {
 
 /// The two halves; both keep all vertices, so that what belongs to vertices needs no new numbers.
 fn separated(mut mesh: TriangleMesh, inside: &[bool]) -> Scene {
-    let keep = |list: &mut Vec<[u32; 3]>, wanted: bool| {
+    let TriangleMesh { positions, faces, colours, uv, materials, .. } = mesh.clone();
+    let mut obstacles = TriangleMesh { positions, faces, colours, uv, materials, ..TriangleMesh::default() };
+    keep_faces(&mut obstacles, &|face| !inside[face]);
+    keep_faces(&mut mesh, &|face| inside[face]);
+    Scene { canvas: mesh, obstacles, clean: Vec::new() }
+}
+
+fn keep_faces(mesh: &mut TriangleMesh, wanted: &dyn Fn(usize) -> bool) {
+    fn keep<T>(list: &mut Vec<T>, wanted: &dyn Fn(usize) -> bool) {
         let mut k = 0..;
-        list.retain(|_| k.next().is_some_and(|k: usize| inside[k] == wanted));
-    };
-    let mut obstacles =
-        TriangleMesh { positions: mesh.positions.clone(), faces: mesh.faces.clone(), ..TriangleMesh::default() };
-    keep(&mut obstacles.faces, false);
-    keep(&mut mesh.faces, true);
+        list.retain(|_| k.next().is_some_and(wanted));
+    }
+    keep(&mut mesh.faces, wanted);
     if let Some(uv) = &mut mesh.uv {
-        keep(&mut uv.faces, true);
+        keep(&mut uv.faces, wanted);
     }
     if let Some(materials) = &mut mesh.materials {
-        let mut k = 0..;
-        materials.faces.retain(|_| k.next().is_some_and(|k: usize| inside[k]));
+        keep(&mut materials.faces, wanted);
     }
-    Scene { canvas: mesh, obstacles, clean: Vec::new() }
 }
 
 const USAGE: &str = "give box:x0,y0,z0,x1,y1,z1, plane:px,py,pz,nx,ny,nz,RADIUS, pick:px,py,pz or mask:PNG, in the coordinates of the \

@@ -341,6 +341,8 @@ impl Report {
         text += &(times::in_sorties(self.sorties) + &not_flown(self.not_flown_s));
         for (file, caption) in [
             ("painted_view.png", "The painted surface as a camera sees it"),
+            ("views.png", "From the left, the front and the right, from near and far"),
+            ("turntable.png", "From around"),
             ("wanted.png", "Wanted"),
             ("painted.png", "Painted"),
             ("error.png", "Difference"),

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use nalgebra::Point3;
 use paint_net::Image;
 use paint_sim::colour::ciede2000;
 use paint_sim::surface::Hit;
@@ -15,12 +14,12 @@ use super::figures::mean;
 use super::kept_clean::KeptClean;
 use super::mission_output::{save, save_flights, save_flown_path};
 use super::painted_mesh::save_painted_mesh;
+use super::painted_views::save_painted_views;
 use super::picture_figures::{PictureFigures, save_out_of_gamut, wanted_looks};
 use super::progress_views::ProgressViews;
 use super::run::Mission;
 use super::sagging::{sagging_share, save_sagging};
 use super::shading::shading_of_colours;
-use super::view::{camera, picture_of, view};
 use super::written_file::{unwritable, write};
 use crate::pictures::{COLOUR_DIFFERENCE, Rgb, save_error_map};
 use crate::progress::Stage;
@@ -177,10 +176,8 @@ fn save_pictures(
         save_out_of_gamut(picture, wanted, [width, height], folder)?;
     }
     let colours: [Image; 3] = linear(painted, width, height)?;
-    let corners: Vec<Point3<f64>> = task.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
     let shade = |hit: &Hit| shading_of_colours(task, &colours, hit);
-    let frame = view(task, &camera(task, &corners)?, &shade)?;
-    picture_of(&frame).save(&folder.join("painted_view.png"))?;
+    save_painted_views(task, &shade, folder)?;
     save_flown_path(mission, &shade, folder)?;
     save_progress(coats, &folder.join("progress.png"))?;
     let texel = (task.settings.texel, "m");

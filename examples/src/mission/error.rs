@@ -35,6 +35,9 @@ pub enum MissionError {
         /// Its value.
         value: f64,
     },
+    /// A turntable without places, or with too many.
+    #[error("setting show.turntable: it must be from 1 to 72 places")]
+    Turntable,
     /// A pitch at which nothing hovers.
     #[error("setting pitch = {value} rad: it must be from 0 to π/3")]
     Pitch {

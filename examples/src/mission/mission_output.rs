@@ -13,6 +13,7 @@ use super::error::MissionError;
 use super::figures::report;
 use super::inspect::inspect;
 use super::painted_mesh::save_painted_mesh;
+use super::painted_views::save_painted_views;
 use super::painting_task::PaintingTask;
 use super::path_view::save_path;
 use super::progress_views::save_progress;
@@ -21,7 +22,6 @@ use super::sagging::save_sagging;
 use super::settings::PainterChoice;
 use super::shading::shading;
 use super::trajectory_table::trajectory_table;
-use super::view::{camera, picture_of, view};
 use super::written_file::{unwritable, write};
 use crate::mesh_io::{PlyMesh, write_ply};
 use crate::pictures::{COLOUR_DIFFERENCE, ErrorScale, Panel, Rgb, save_curves, save_error_map};
@@ -56,8 +56,8 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
         let colours = save_painted_mesh(&mission.task, &page_colours(&mission.task, &mission.painted_depth()), folder)?;
         stage.share(0.4);
         let painted = mission.painted_depth();
-        painted_view(&mission.task, &painted)?.save(&folder.join("painted_view.png"))?;
         let shade = |hit: &Hit| shading(&mission.task, &painted, hit);
+        save_painted_views(&mission.task, &shade, folder)?;
         save_progress(mission, &folder.join("progress.png"))?;
         save_flown_path(mission, &shade, folder)?;
         stage.share(0.8);
@@ -109,13 +109,6 @@ pub(super) fn page_colours(task: &PaintingTask, depth: &Image) -> Vec<Option<[u8
 /// The chart with this depth of paint on its pixels.
 pub(super) fn texture(task: &PaintingTask, depth: &Image) -> Rgb {
     Rgb::of_page(depth.width(), depth.height(), page_colours(task, depth))
-}
-
-/// The surface with this depth of paint as somebody standing before it sees it.
-pub(super) fn painted_view(task: &PaintingTask, painted: &Image) -> Result<Rgb, MissionError> {
-    let corners: Vec<Point3<f64>> = task.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
-    let shade = |hit: &Hit| shading(task, painted, hit);
-    Ok(picture_of(&view(task, &camera(task, &corners)?, &shade)?))
 }
 
 /// The way of the first flight before the surface: of several layers the base coat alone, as all of them hide the surface and one another.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use paint_net::{Image, Painting};
+use paint_sim::render::Coat;
 use paint_sim::{Film, Substrate, Texel, TriangleSurface};
 use ptu_kinematics::Ptu;
 
@@ -27,6 +28,7 @@ use crate::region::Scene;
 use crate::report::ReachNeeds;
 use crate::say;
 use crate::surface::PaintSurface;
+use crate::surroundings::Surroundings;
 
 /// Flight logs are most of what a mission keeps: the built-in wall of 10.6 m² takes 200 MB with texels of 1.25 cm.
 const BYTES_PER_SQUARE_METRE: f64 = 2e7;
@@ -45,6 +47,10 @@ pub struct PaintingTask {
     /// What is in the tank.
     pub(super) paint: NamedPaint,
     pub(super) surface: Arc<PaintSurface>,
+    /// What stands around it.
+    pub(super) surroundings: Arc<Surroundings>,
+    /// What lies over the paint when it is shown.
+    pub(super) varnish: Option<Coat>,
     pub(super) appearance: Appearance,
     /// The robot that the simulation flies.
     pub(super) robot: Robot,
@@ -128,10 +134,14 @@ impl PaintingTask {
         if !in_reach.contains(&true) {
             return Err(MissionError::NothingToPaint("all that is in reach stays clean"));
         }
+        let surroundings = Surroundings::new(surface.disk(), scene);
+        let varnish = settings.show.gloss.map(Coat::new).transpose()?;
         Ok(Self {
             settings,
             name: name.to_string(),
             paint,
+            surroundings: Arc::new(surroundings),
+            varnish,
             surface: Arc::new(surface),
             appearance,
             robot,

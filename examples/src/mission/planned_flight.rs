@@ -5,6 +5,7 @@ use std::path::Path;
 use paint_planner::Plan;
 use paint_sim::flight::{FlightLog, Reference};
 use paint_sim::spray::QUANTUM;
+use paint_sim::surface::Hit;
 use serde::Serialize;
 
 use super::error::MissionError;
@@ -13,9 +14,11 @@ use super::flight_conditions::counted_flight;
 use super::flight_sensors::{Poses, camera_before};
 use super::fly::{Sprayed, spray};
 use super::flyer::{Flight, Purpose};
-use super::mission_output::{painted_view, texture};
+use super::mission_output::texture;
+use super::painted_views::save_painted_views;
 use super::painting_task::PaintingTask;
 use super::planned_mission::PlannedMission;
+use super::shading::shading;
 use super::simulated_flight::reference;
 use super::wet_surface::DriedSurface;
 use crate::adapters::PlanReference;
@@ -75,7 +78,7 @@ impl<'a> PlannedFlight<'a> {
         let Sprayed { surface: DriedSurface { film, pixels, .. }, .. } = spray(std::iter::once((log, false)), task)?;
         let depth = task.depth_of(&film, &pixels);
         texture(task, &depth).save(&folder.join("painted.png"))?;
-        painted_view(task, &depth)?.save(&folder.join("painted_view.png"))?;
+        save_painted_views(task, &|hit: &Hit| shading(task, &depth, hit), folder)?;
         let kilograms = |quanta: u64| quanta as f64 * QUANTUM * DENSITY;
         Ok(FlownFigures {
             limit_violations: limit_violations(self.plan, log, &task.settings),

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::MissionError;
 use super::planner_choice::PlannerChoice;
+use crate::light::Light;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
 use crate::simulated_sensors::FaultInterval;
@@ -92,6 +93,40 @@ pub struct MissionSettings {
     /// behind the middle of the flight.
     #[serde(skip_serializing_if = "FlightConstraints::is_empty")]
     pub constraints: FlightConstraints,
+    /// How the painted surface is shown.
+    #[serde(skip_serializing_if = "Showing::is_default")]
+    pub show: Showing,
+}
+
+/// How the painted surface is shown: nothing of it changes what is painted.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Showing {
+    /// In what light; without it a sun behind the camera, without sky. With it, also from several places.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light: Option<Light>,
+    /// Roughness of a varnish over the painted surface, 0.02 to 1; matt without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gloss: Option<f64>,
+    /// From how many places around it; none without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turntable: Option<u16>,
+}
+
+/// Most places of a turntable.
+pub(crate) const TURNTABLE: u16 = 72;
+
+impl Showing {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    fn check(&self) -> Result<(), MissionError> {
+        if self.turntable.is_some_and(|count| !(1..=TURNTABLE).contains(&count)) {
+            return Err(MissionError::Turntable);
+        }
+        self.gloss.map_or(Ok(()), |roughness| Ok(paint_sim::render::Coat::new(roughness).map(|_| ())?))
+    }
 }
 
 /// The flight controllers to choose from.
@@ -185,6 +220,7 @@ impl Default for MissionSettings {
             faults: Faults::default(),
             sensor_faults: Vec::new(),
             constraints: FlightConstraints::default(),
+            show: Showing::default(),
         }
     }
 }
@@ -211,6 +247,7 @@ impl MissionSettings {
         if self.look && !self.constraints.is_empty() {
             return Err(MissionError::LookConstrained);
         }
+        self.show.check()?;
         Ok(self.constraints.check()?)
     }
 

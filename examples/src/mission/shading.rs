@@ -7,7 +7,7 @@ use uv_param::SurfacePoint;
 
 use super::painting_task::PaintingTask;
 
-/// Shading of a point of the world: painted and smooth on the disk, grey elsewhere.
+/// Shading of a point of the world: painted and smooth on the disk, in the colours of the mesh elsewhere.
 pub(super) fn shading(task: &PaintingTask, painted: &Image, hit: &Hit) -> Shading {
     shading_by(task, hit, &|x, y| task.appearance.linear(bilinear(painted, x, y)))
 }
@@ -20,14 +20,15 @@ pub(super) fn shading_of_colours(task: &PaintingTask, linear: &[Image; 3], hit: 
 /// `colour` gives linear sRGB at a place of the chart, in pixels.
 fn shading_by(task: &PaintingTask, hit: &Hit, colour: &dyn Fn(f64, f64) -> [f64; 3]) -> Shading {
     let Some(face) = task.surface.disk().faces().get(hit.face as usize) else {
-        return Shading::matt([0.4; 3], hit.normal);
+        return Shading::matt(task.surroundings.albedo(hit), hit.normal);
     };
     let [u, v] = place(task, *face, hit).map(|m| m / task.settings.texel);
     let (x, y) = (u - 0.5, task.surface.height() as f64 - v - 0.5);
     let [a, b] = hit.barycentric;
     let albedo = colour(x, y).map(|c| c as f32);
     let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
-    Shading::matt(albedo, task.surface.chart.smooth_normal(at).into_inner())
+    let normal = task.surface.chart.smooth_normal(at).into_inner();
+    Shading { albedo, normal, coat: task.varnish }
 }
 
 /// Colour of every vertex of the disk with `depth` of paint on its texels.

@@ -2,13 +2,16 @@
 
 use std::path::Path;
 
+use paint_sim::surface::Hit;
 use paint_sim::{Film, Shot, Substrate, TriangleSurface};
 
 use super::error::MissionError;
-use super::mission_output::{page_colours, painted_view, texture};
+use super::mission_output::{page_colours, texture};
 use super::painted_mesh::save_painted_mesh;
+use super::painted_views::save_painted_views;
 use super::painting_task::PaintingTask;
 use super::settings::MissionSettings;
+use super::shading::shading;
 use super::wet_surface::WetSurface;
 use crate::paint_set::NamedPaint;
 use crate::progress::Stage;
@@ -105,6 +108,6 @@ impl SprayedFilm {
         let depth = self.surface.depth(&self.task);
         texture(&self.task, &depth).save(&folder.join("painted.png"))?;
         save_painted_mesh(&self.task, &page_colours(&self.task, &depth), folder)?;
-        Ok(painted_view(&self.task, &depth)?.save(&folder.join("painted_view.png"))?)
+        save_painted_views(&self.task, &|hit: &Hit| shading(&self.task, &depth, hit), folder)
     }
 }

@@ -23,24 +23,36 @@ const NEAREST: f64 = 0.1;
 /// Hits as near as this to a place are the place itself, metres.
 const OWN_SURFACE: f64 = 0.01;
 
-/// The surface in the light of a sun behind the camera's shoulder.
+/// The surface in the light that is asked for; without one, of a sun behind the camera's shoulder.
 pub(super) fn view(
     task: &PaintingTask,
     camera: &Camera,
     shade: &(dyn Fn(&Hit) -> Shading + Sync),
 ) -> Result<Frame, MissionError> {
+    Ok(render(&task.surface.world, camera, shade, &lights(task, camera)?, 2, task.settings.threads)?)
+}
+
+fn lights(task: &PaintingTask, camera: &Camera) -> Result<Lights, MissionError> {
+    if let Some(light) = task.settings.show.light {
+        return Ok(light.lights(&front(task), task.surface.corners())?);
+    }
     let away = -(camera.world_from_camera.rotation * Vector3::z());
     let side = Vector3::z().cross(&away);
-    let lights = Lights {
+    Ok(Lights {
         towards_sun: UnitVector3::new_normalize(away + 0.75 * Vector3::z() + 0.35 * side),
         sun: [0.95, 0.9, 0.8],
         ambient: [0.28, 0.30, 0.34],
         ..Lights::default()
-    };
-    Ok(render(&task.surface.world, camera, shade, &lights, 2, task.settings.threads)?)
+    })
 }
 
-fn extent(points: &[Point3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
+/// The level direction of the surface's mean side.
+pub(super) fn front(task: &PaintingTask) -> Vector3<f64> {
+    let facing = task.surface.facing();
+    Vector3::new(facing.x, facing.y, 0.0).try_normalize(0.1).unwrap_or(-Vector3::x())
+}
+
+pub(super) fn extent(points: &[Point3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
     let none = (Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN));
     points.iter().fold(none, |(l, h), p| (l.inf(&p.coords), h.sup(&p.coords)))
 }
@@ -49,9 +61,7 @@ fn extent(points: &[Point3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
 pub(super) fn camera(task: &PaintingTask, points: &[Point3<f64>]) -> Result<Camera, MissionError> {
     let (low, high) = extent(points);
     let centre = (low + high) / 2.0;
-    let facing = task.surface.facing();
-    let flat = Vector3::new(facing.x, facing.y, 0.0);
-    let front: Vector3<f64> = flat.try_normalize(0.1).unwrap_or(-Vector3::x());
+    let front = front(task);
     let side: Vector3<f64> = Vector3::z().cross(&front);
     let from =
         |to_side: f64, above: f64| fitted(points, centre, (front + side * to_side + Vector3::z() * above).normalize());
@@ -84,7 +94,11 @@ fn visible(task: &PaintingTask, camera: &Camera) -> usize {
 }
 
 /// A camera in a direction from the middle of points that has all of them in view.
-fn fitted(points: &[Point3<f64>], centre: Vector3<f64>, direction: Vector3<f64>) -> Result<Camera, MissionError> {
+pub(super) fn fitted(
+    points: &[Point3<f64>],
+    centre: Vector3<f64>,
+    direction: Vector3<f64>,
+) -> Result<Camera, MissionError> {
     let (low, high) = extent(points);
     let up = Vector3::z();
     let look = |target: Vector3<f64>, distance: f64| {
@@ -134,6 +148,16 @@ fn fitted(points: &[Point3<f64>], centre: Vector3<f64>, direction: Vector3<f64>)
         camera = look(target, distance)?;
     }
     Ok(camera)
+}
+
+/// The same camera so many times as far from a place.
+pub(super) fn farther(camera: &Camera, place: &Vector3<f64>, times: f64) -> Camera {
+    let eye = camera.world_from_camera.translation.vector;
+    let ahead = camera.world_from_camera.rotation * Vector3::z();
+    let distance = (place - eye).dot(&ahead);
+    let mut farther = *camera;
+    farther.world_from_camera.translation.vector = eye - ahead * (distance * (times - 1.0));
+    farther
 }
 
 /// The same camera with so many pixels on its longer side.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Parser;
 
 use crate::mesh_frame::MeshScale;
+use crate::mission_arguments::ShowingArguments;
 use crate::wall::Wall;
 
 /// Sprays a recorded motion of a nozzle onto a mesh: the painted mesh, pictures, and what became of the paint.
@@ -42,6 +43,9 @@ pub struct Arguments {
     /// Standard deviation of the spray 10 cm before the nozzle, metres
     #[arg(long, value_name = "METRES", value_parser = positive, default_value = "0.025")]
     pub spot: f64,
+    /// How it is shown.
+    #[command(flatten)]
+    pub showing: ShowingArguments,
     /// Worker threads [default: all cores]; results do not depend on it
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,

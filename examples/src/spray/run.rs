@@ -74,7 +74,8 @@ pub fn run(arguments: &Arguments) -> Result<(), SprayError> {
     run_folder::begin(folder, "spray").map_err(|source| SprayError::Folder { path: folder.to_owned(), source })?;
     let defaults = MissionSettings::default();
     let threads = arguments.threads.map_or(defaults.threads, usize::from);
-    let settings = MissionSettings { texel: arguments.texel, spot: arguments.spot, threads, ..defaults };
+    let mut settings = MissionSettings { texel: arguments.texel, spot: arguments.spot, threads, ..defaults };
+    arguments.showing.apply(&mut settings.show);
     let wall = arguments.wall.substrate().map_err(crate::mission::MissionError::from)?;
     let (paint_name, density) = (paint.name.clone(), paint.liquid.density);
     let mut sprayed = SprayedFilm::new(&name, &scene, settings, paint, &wall)?;

@@ -77,6 +77,29 @@ fn a_straight_pass_leaves_the_thickness_of_the_closed_form() {
     }
 }
 
+/// The same paint in another light: warmer at dusk than at noon, from more places; the figures stay.
+#[test]
+fn light_changes_the_pictures_and_nothing_else() {
+    let s = Scratch::new("light");
+    s.write("pass.csv", &pass(&|_, row| Some(row)));
+    let mesh = wall(&s);
+    let mut redness = Vec::new();
+    let mut figures = Vec::new();
+    for light in ["noon", "dusk"] {
+        let more = ["--mesh", &mesh, "--light", light, "--gloss", "0.3", "--turntable", "2"];
+        let report = sprayed(&s, &s.path("pass.csv"), &more).unwrap();
+        figures.push(report["thickness_mean_m"].clone());
+        let picture = image::open(s.0.join("out/painted_view.png")).unwrap().to_rgb8();
+        let sum = |c: usize| picture.pixels().map(|pixel| f64::from(pixel.0[c])).sum::<f64>();
+        redness.push(sum(0) / sum(2));
+        for file in ["views.png", "turntable.png"] {
+            assert!(s.0.join("out").join(file).exists(), "{file} is missing");
+        }
+    }
+    assert_eq!(figures[0], figures[1]);
+    assert!(redness[1] > 1.05 * redness[0], "{redness:?}");
+}
+
 #[test]
 fn gaps_stay_bare_and_stamps_that_go_back_are_left_out() {
     let s = Scratch::new("gap");
