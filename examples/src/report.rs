@@ -4,6 +4,7 @@ mod check;
 mod film;
 mod identified;
 mod localisation;
+mod pictures;
 mod reach;
 mod times;
 
@@ -18,6 +19,7 @@ pub use check::{Check, Requirement, Unit};
 pub use film::FilmFigures;
 pub use identified::IdentifiedFigures;
 pub use localisation::LocalisationReport;
+use pictures::PICTURES;
 pub use reach::ReachNeeds;
 pub use times::TimeFigures;
 pub(crate) use times::not_flown;
@@ -339,16 +341,7 @@ impl Report {
             self.version
         );
         text += &(times::in_sorties(self.sorties) + &not_flown(self.not_flown_s));
-        for (file, caption) in [
-            ("painted_view.png", "The painted surface as a camera sees it"),
-            ("views.png", "From the left, the front and the right, from near and far"),
-            ("turntable.png", "From around"),
-            ("wanted.png", "Wanted"),
-            ("painted.png", "Painted"),
-            ("error.png", "Difference"),
-            ("path.png", "Flown path, of the base coat if there are layers: vehicle orange, nozzle blue"),
-            ("angles.png", "Pan, tilt, distance and normal deviation over time"),
-        ] {
+        for (file, caption) in PICTURES {
             if folder.join(file).exists() {
                 let _ = writeln!(text, "**{caption}**\n\n![{caption}]({file})\n");
             }
