@@ -112,7 +112,11 @@ mod tests {
         let faces = (0..32).flat_map(|k| quad(9 * (k / 8) + k % 8)).collect();
         let canvas = TriangleMesh { positions: (0..45).map(corner).collect(), faces, ..TriangleMesh::default() };
         let positions = vec![[0.0, -2.0, 1.0], [0.0, -3.0, 1.0], [0.0, -3.0, 2.0], [0.0, -2.0, 2.0]];
-        Scene { canvas, obstacles: TriangleMesh { positions, faces: vec![[0, 1, 2], [0, 2, 3]], ..obstacles } }
+        Scene {
+            canvas,
+            obstacles: TriangleMesh { positions, faces: vec![[0, 1, 2], [0, 2, 3]], ..obstacles },
+            ..Scene::default()
+        }
     }
 
     fn seen(scene: &Scene, y: f64, z: f64) -> [f32; 3] {

@@ -81,7 +81,7 @@ fn a_straight_pass_leaves_the_thickness_of_the_closed_form() {
 #[test]
 fn light_changes_the_pictures_and_nothing_else() {
     let s = Scratch::new("light");
-    s.write("pass.csv", &pass(&|_, row| Some(row)));
+    s.write("pass.csv", pass(&|_, row| Some(row)));
     let mesh = wall(&s);
     let mut redness = Vec::new();
     let mut figures = Vec::new();
