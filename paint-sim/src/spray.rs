@@ -3,6 +3,8 @@
 pub mod calibration;
 mod ellipse;
 
+use std::array::from_fn;
+
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
 use crate::error::{Error, check_positive, check_range};
@@ -126,8 +128,8 @@ pub(crate) struct Cone<'a> {
     pub(crate) axis: &'a Vector3<f64>,
     /// Tangent of the half opening.
     pub(crate) slope: f64,
-    /// Cosine of the half opening.
-    pub(crate) cosine: f64,
+    /// One over its cosine.
+    secant: f64,
     pub(crate) range: f64,
     /// Slope deviation, the smaller one of an ellipse.
     pub(crate) deviation: f64,
@@ -160,7 +162,7 @@ impl<'a> Cone<'a> {
             origin,
             axis: axis.as_ref(),
             slope,
-            cosine: 1.0 / (1.0 + slope * slope).sqrt(),
+            secant: slope.hypot(1.0),
             range: spray.range,
             deviation: ellipse.deviations[0].min(ellipse.deviations[1]),
             exponent: -0.5 / (deviation * deviation),
@@ -171,19 +173,33 @@ impl<'a> Cone<'a> {
 
     /// Paint per area and unit volume at `point`, 1/m^2.
     pub(crate) fn density(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
-        let ray = point - self.origin;
-        let depth = ray.dot(self.axis);
-        let facing = -ray.dot(normal);
-        if !(depth > 0.0 && depth <= self.range && facing > 0.0) {
-            return 0.0;
-        }
-        let exponent = if let Some(cone) = &self.elliptic {
-            cone.squared(&(ray / depth)).map(|square| -0.5 * square)
+        self.densities(&point.coords.data.0[0].map(|coordinate| [coordinate]), normal)[0]
+    }
+
+    /// The same at several points of one plane, given by their coordinates: divisions take most of the time, and so they go side by side.
+    #[inline(always)]
+    pub(crate) fn densities<const N: usize>(&self, [x, y, z]: &[[f64; N]; 3], normal: &Vector3<f64>) -> [f64; N] {
+        let (origin, axis) = (self.origin, self.axis);
+        let (x, y, z) = (x.map(|x| x - origin.x), y.map(|y| y - origin.y), z.map(|z| z - origin.z));
+        let along = |v: &Vector3<f64>| from_fn::<f64, N, _>(|i| x[i] * v.x + y[i] * v.y + z[i] * v.z);
+        let (depth, facing) = (along(axis), along(normal).map(|away| -away));
+        let slope = |v: &[f64; N]| from_fn::<f64, N, _>(|i| v[i] / depth[i]);
+        let (x, y, z) = (slope(&x), slope(&y), slope(&z));
+        let (squares, most, factor): ([f64; N], f64, f64) = if let Some(cone) = &self.elliptic {
+            (from_fn(|i| cone.squared(&Vector3::new(x[i], y[i], z[i]))), cone.cut * cone.cut, -0.5)
         } else {
-            let slope_squared = (ray / depth - self.axis).norm_squared();
-            (slope_squared <= self.slope * self.slope).then_some(self.exponent * slope_squared)
+            let square = |[x, y, z]: [f64; 3]| x * x + y * y + z * z;
+            let sideways = |i| square([x[i] - axis.x, y[i] - axis.y, z[i] - axis.z]);
+            (from_fn(sideways), self.slope * self.slope, self.exponent)
         };
-        exponent.map_or(0.0, |exponent| self.scale * exponent.exp() * facing / (depth * depth * depth))
+        let before = |i: usize| depth[i] > 0.0 && depth[i] <= self.range && facing[i] > 0.0;
+        let inside: [bool; N] = from_fn(|i| before(i) && squares[i] <= most);
+        if !inside.contains(&true) {
+            return [0.0; N];
+        }
+        let gauss = squares.map(|square| (factor * square).exp());
+        let density: [f64; N] = from_fn(|i| self.scale * gauss[i] * facing[i] / (depth[i] * depth[i] * depth[i]));
+        from_fn(|i| if inside[i] { density[i] } else { 0.0 })
     }
 
     /// Whether a ball may touch the cone; never false when it does.
@@ -196,7 +212,8 @@ impl<'a> Cone<'a> {
         if let Some(cone) = &self.elliptic {
             return cone.may_intersect(&ray, depth, radius);
         }
-        let sideways = (ray - self.axis * depth).norm();
-        (sideways - self.slope * depth) * self.cosine <= radius
+        let sideways = (ray - self.axis * depth).norm_squared();
+        let reach = self.slope * depth + radius * self.secant;
+        reach >= 0.0 && sideways <= reach * reach
     }
 }

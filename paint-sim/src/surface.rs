@@ -3,6 +3,7 @@
 mod beam;
 mod mesh;
 mod ray_query;
+mod shadow_beam;
 mod sheared_ray;
 
 pub use mesh::TriangleSurface;

@@ -1,5 +1,7 @@
 //! From shots to paint on texels: density, shadows, and rounding that loses nothing.
 
+use std::array::from_fn;
+
 use nalgebra::Vector3;
 
 use super::texel::{Texel, check_unit};
@@ -20,6 +22,9 @@ const MAX_PIECE_SIZE: f64 = 0.5;
 
 /// Most pieces per side of one texel.
 const MAX_PIECES_PER_SIDE: f64 = 8.0;
+
+/// Radius of a ball around all samples of a texel, in its sides: half a diagonal, and a little for rounding.
+const REACH: f64 = 0.75;
 
 /// Gauss points of order two on -1/2..1/2: `+- 1/sqrt(12)`.
 const GAUSS: f64 = 0.288_675_134_594_812_9;
@@ -128,15 +133,14 @@ fn find_shares(
     shares: &mut Vec<(u32, f64)>,
 ) {
     let cone = Cone::new(spray, &shot.origin, &shot.axis);
-    let clearance = surface.distance(&shot.origin, spray.range) * (1.0 - 1e-9);
     shares.clear();
     texels.tree.for_each(&cone, stack, |index| {
-        let texel = &texels.texels[index as usize];
-        let share = texel_share(&cone, texel);
-        if share > 0.0 && !in_shadow(&cone, texel, spray.shadow_bias, clearance, surface) {
+        let share = texel_share(&cone, &texels.texels[index as usize]);
+        if share > 0.0 {
             shares.push((index, share));
         }
     });
+    remove_shadowed(texels, shot, spray, surface, shares);
 }
 
 /// What is left of every claim where all of them together claim more than the cone keeps.
@@ -152,6 +156,9 @@ fn texel_share(cone: &Cone, texel: &Texel) -> f64 {
     if side <= SINGLE_SAMPLE_SIZE * deviation {
         return cone.density(&texel.point, &texel.normal) * texel.area;
     }
+    if !cone.may_intersect(&texel.point, REACH * side) {
+        return 0.0;
+    }
     // A texel at or behind the nozzle's height has no positive deviation; part of it may still be before the nozzle.
     let pieces = if deviation > 0.0 {
         (side / (MAX_PIECE_SIZE * deviation)).ceil().min(MAX_PIECES_PER_SIDE)
@@ -160,12 +167,19 @@ fn texel_share(cone: &Cone, texel: &Texel) -> f64 {
     };
     let step = side / pieces;
     let (u, v) = tangents(&texel.normal);
-    let points = || (0..2 * pieces as u32).map(|i| gauss_point(i) * step - 0.5 * side);
+    let row = 2 * pieces as usize;
+    let mut offsets = [0.0; 2 * MAX_PIECES_PER_SIDE as usize];
+    for (i, offset) in offsets[..row].iter_mut().enumerate() {
+        *offset = gauss_point(i as u32) * step - 0.5 * side;
+    }
     let mut sum = 0.0;
-    for a in points() {
-        let row = texel.point + u * a;
-        for b in points() {
-            sum += cone.density(&(row + v * b), &texel.normal);
+    for a in &offsets[..row] {
+        let middle = texel.point + u * *a;
+        for pair in offsets[..row].chunks_exact(2) {
+            let points: [[f64; 2]; 3] = from_fn(|axis| from_fn(|k| middle[axis] + v[axis] * pair[k]));
+            let [first, second] = cone.densities(&points, &texel.normal);
+            sum += first;
+            sum += second;
         }
     }
     0.25 * sum * step * step
@@ -185,17 +199,23 @@ fn tangents(n: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (Vector3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vector3::new(b, sign + n.y * n.y * a, -n.y))
 }
 
-/// Whether something stands between the nozzle and the texel. Nothing is closer to the nozzle than `clearance`, so the
-/// ray starts there.
-fn in_shadow(cone: &Cone, texel: &Texel, bias: f64, clearance: f64, surface: &dyn Surface) -> bool {
-    let ray = texel.point - cone.origin;
-    let distance = ray.norm();
-    let left = distance - clearance - bias;
-    if left <= 0.0 {
-        return false;
-    }
-    let direction = ray / distance;
-    surface.occluded(&(cone.origin + direction * clearance), &direction, left)
+/// Takes away the shares of texels which something stands before. Nothing is closer to the nozzle than the surface, so the rays start there.
+fn remove_shadowed(
+    texels: &TexelIndex,
+    shot: &Shot,
+    spray: &SprayModel,
+    surface: &dyn Surface,
+    shares: &mut Vec<(u32, f64)>,
+) {
+    let clearance = surface.distance(&shot.origin, spray.range) * (1.0 - 1e-9);
+    let to_texel = |(texel, _): &(u32, f64)| {
+        let ray = texels.texels[*texel as usize].point - shot.origin;
+        let distance = ray.norm();
+        (ray / distance, distance - clearance - spray.shadow_bias)
+    };
+    let rays: Vec<(Vector3<f64>, f64)> = shares.iter().map(to_texel).collect();
+    let mut occluded = surface.occluded_beam(&shot.origin, clearance, &rays).into_iter();
+    shares.retain(|_| occluded.next() != Some(true));
 }
 
 /// Largest remainder rounding of `shares * emitted`: whole quanta whose sum is the rounded sum.

@@ -63,7 +63,8 @@ impl SlopeEllipse {
 /// An elliptic cone in the world.
 pub(crate) struct EllipticCone {
     sides: [Side; 2],
-    cut: f64,
+    /// Deviations from the middle beyond which there is no paint.
+    pub(crate) cut: f64,
 }
 
 struct Side {
@@ -77,11 +78,9 @@ struct Side {
 }
 
 impl EllipticCone {
-    /// Square of the distance from the middle in deviations, at a slope (ray over depth); `None` beyond the cut.
-    pub(crate) fn squared(&self, slope: &Vector3<f64>) -> Option<f64> {
-        let square: f64 =
-            self.sides.iter().map(|side| ((slope.dot(&side.direction) - side.center) / side.deviation).powi(2)).sum();
-        (square <= self.cut * self.cut).then_some(square)
+    /// Square of the distance from the middle in deviations, at a slope (ray over depth).
+    pub(crate) fn squared(&self, slope: &Vector3<f64>) -> f64 {
+        self.sides.iter().map(|side| ((slope.dot(&side.direction) - side.center) / side.deviation).powi(2)).sum()
     }
 
     /// Whether a ball may touch the pyramid around the cone; never false when it touches the cone.

@@ -9,8 +9,16 @@ use parry3d_f64::shape::Triangle;
 
 use super::beam::{Beam, Candidate};
 use super::ray_query::{Hit, Surface, cast_each};
+use super::shadow_beam::ShadowBeam;
 use super::sheared_ray::ShearedRay;
 use crate::error::Error;
+
+/// Rays of a picture whose angle with their mean has a smaller cosine share too little.
+const LEAST_COSINE: f64 = 0.9;
+/// With more triangles than this a search for each ray costs less than a test of each ray with each of them.
+const MOST_LEAVES: usize = 64;
+/// Of slopes: more than their rounding, so that no hit is lost.
+const SLOPE_MARGIN: f64 = 1e-9;
 
 /// A triangle soup: open, unequal, duplicate and zero-area triangles are fine (the last are never hit).
 ///
@@ -121,8 +129,8 @@ impl Surface for TriangleSurface {
     }
 
     fn cast_beam(&self, origin: &Point3<f64>, directions: &[Vector3<f64>], max: f64) -> Vec<Option<Hit>> {
-        let beam = Beam::around(origin, directions);
-        let Some(leaves) = beam.as_ref().and_then(|beam| beam.leaves(&self.tree)) else {
+        let beam = Beam::around(origin, directions.iter().copied(), LEAST_COSINE, SLOPE_MARGIN);
+        let Some(leaves) = beam.as_ref().and_then(|beam| beam.leaves(&self.tree, MOST_LEAVES)) else {
             // Rays that diverge, or among many small triangles, are better searched for one by one.
             return cast_each(self, origin, directions, max);
         };
@@ -154,6 +162,16 @@ impl Surface for TriangleSurface {
             if found { TraversalAction::EarlyExit } else { TraversalAction::Continue }
         });
         found
+    }
+
+    fn occluded_beam(&self, origin: &Point3<f64>, from: f64, rays: &[(Vector3<f64>, f64)]) -> Vec<bool> {
+        let beam = ShadowBeam::around(origin, from, rays, &self.tree, &self.corners);
+        let occluded = |(direction, length): &(Vector3<f64>, f64)| {
+            *length > 0.0
+                && !beam.as_ref().is_some_and(|beam| beam.is_free(direction, from + length))
+                && self.occluded(&(origin + direction * from), direction, *length)
+        };
+        rays.iter().map(occluded).collect()
     }
 
     fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {

@@ -31,6 +31,16 @@ pub trait Surface: Sync {
         self.cast(origin, direction, max).is_some()
     }
 
+    /// [`occluded`](Self::occluded) of rays that leave one point: for each of them (unit direction, length in metres) whether anything lies on
+    /// the stretch of that length which begins `from` metres from `origin`; never on one whose length is not positive. Override it where such
+    /// rays can share their search; the answers must be those of each ray alone.
+    fn occluded_beam(&self, origin: &Point3<f64>, from: f64, rays: &[(Vector3<f64>, f64)]) -> Vec<bool> {
+        let occluded = |(direction, length): &(Vector3<f64>, f64)| {
+            *length > 0.0 && self.occluded(&(origin + direction * from), direction, *length)
+        };
+        rays.iter().map(occluded).collect()
+    }
+
     /// Distance from `point` to the closest point of the surface, at most `max` (also returned when it is farther), m.
     fn distance(&self, point: &Point3<f64>, max: f64) -> f64;
 }

@@ -112,6 +112,16 @@ fn coarse_texels_are_integrated() {
 const ERF_SQUARED: f64 = 0.7145072034719534;
 
 #[test]
+fn a_texel_at_the_rim_catches_what_its_corner_catches() {
+    // The spot of 3 sigmas ends 42.2 mm from the axis. On the diagonal, a square of 4 cm around a place 24 mm farther out reaches 4 mm into it.
+    let across = (0.1 * 3.0 * 8.0_f64.to_radians().tan() + 0.024) / 2.0_f64.sqrt();
+    let texel = Texel { point: Point3::new(across, across, 0.1), normal: unit(0.0, 0.0, -1.0), area: 0.04 * 0.04 };
+    let mut film = Film::new(vec![texel]).unwrap();
+    let balance = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &SprayModel::default(), &far_plate(), 1);
+    assert!(balance.deposited > 0 && balance.deposited < 1_000_000, "{balance:?}");
+}
+
+#[test]
 fn the_tree_misses_no_texel() {
     let mut state = 11_u64;
     let mut uniform = || {

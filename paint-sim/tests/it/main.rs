@@ -21,6 +21,7 @@ mod own_pan_tilt;
 mod own_reference;
 mod own_surface;
 mod render;
+mod shadows;
 mod spray_calibration;
 mod spray_shape;
 mod surface;
