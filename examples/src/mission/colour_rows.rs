@@ -7,7 +7,6 @@ use paint_net::{Image, PaintProblem, Spray};
 use paint_sim::Substrate;
 use paint_sim::colour::BANDS;
 
-use super::decide;
 use super::error::MissionError;
 use super::footprints::Footprints;
 use super::nozzle::kernel;
@@ -110,7 +109,7 @@ fn adaptive_rows(
     let seen = visible(&below)?;
     let depths = on_page(&task.coverage.map(|_| 0.0), &picture.pixels, &picture.separated[paint]);
     let wanted = depths.map(|depth| seen.forward(depth).clamp(0.0, 1.0));
-    let weight = decide::weights(task);
+    let weight = task.canvas().weights();
     let kernel = kernel(settings)?;
     let problem = PaintProblem::new(&wanted)
         .with_weight(&weight)

@@ -9,8 +9,8 @@ use paint_net::{Deconvolution, Feedback, Image, Observer, OnSurface, PaintProble
 use super::error::MissionError;
 use super::footprints::Footprints;
 use super::nozzle::kernel;
-use super::painting_task::PaintingTask;
-use super::settings::PainterChoice;
+use super::settings::{MissionSettings, PainterChoice};
+use crate::appearance::Appearance;
 use crate::progress::Stage;
 use crate::surface::PaintSurface;
 
@@ -20,12 +20,26 @@ const UNPAINTABLE_WEIGHT: f64 = 0.02;
 /// Weight of what stays clean.
 const CLEAN_WEIGHT: f64 = 10.0;
 
+/// What there is to paint on, and with.
+#[derive(Clone, Copy)]
+pub(super) struct Canvas<'a> {
+    pub(super) surface: &'a PaintSurface,
+    /// 1 on pixels of the surface, 0 beside it.
+    pub(super) coverage: &'a Image,
+    /// Pixels that the robot can serve.
+    pub(super) in_reach: &'a [bool],
+    /// Pixels that stay clean.
+    pub(super) clean: &'a [bool],
+    pub(super) appearance: &'a Appearance,
+    pub(super) settings: &'a MissionSettings,
+}
+
 /// Layers of sprays for the wanted picture; no spray lies on what is out of reach. Paint that falls beyond a seam counts where it lies,
 /// and volumes are those for what every spray leaves on the surface.
-pub(super) fn decide(wanted: &Image, task: &PaintingTask) -> Result<Vec<Painting>, MissionError> {
+pub(super) fn decide(wanted: &Image, canvas: &Canvas) -> Result<Vec<Painting>, MissionError> {
     let stage = Stage::start("decide");
-    let PaintingTask { surface, in_reach: paintable, appearance, settings, .. } = task;
-    let weight = weights(task);
+    let &Canvas { surface, in_reach: paintable, appearance, settings, .. } = canvas;
+    let weight = canvas.weights();
     let ceiling = ceiling(wanted, surface)?;
     let kernel = kernel(settings)?;
     let problem = PaintProblem::new(wanted)
@@ -71,26 +85,27 @@ pub(super) fn ceiling(wanted: &Image, surface: &PaintSurface) -> Result<Image, p
     ink_ceiling(wanted, &points, &pixels)
 }
 
-/// How much a pixel of the surface matters.
-pub(super) fn weight(task: &PaintingTask, pixel: usize) -> f64 {
-    match (task.clean[pixel], task.in_reach[pixel]) {
-        (true, _) => CLEAN_WEIGHT,
-        (_, true) => 1.0,
-        (_, false) => UNPAINTABLE_WEIGHT,
+impl Canvas<'_> {
+    /// How much a pixel of the surface matters.
+    pub(super) fn weight(&self, pixel: usize) -> f64 {
+        match (self.clean[pixel], self.in_reach[pixel]) {
+            (true, _) => CLEAN_WEIGHT,
+            (_, true) => 1.0,
+            (_, false) => UNPAINTABLE_WEIGHT,
+        }
     }
-}
 
-/// The same of all pixels, those beside the surface too.
-pub(super) fn weights(task: &PaintingTask) -> Image {
-    let PaintingTask { coverage, surface, .. } = task;
-    let mut weights = coverage.clone();
-    for (pixel, covered) in weights.data_mut().iter_mut().enumerate() {
-        *covered *= weight(task, pixel);
+    /// The same of all pixels, those beside the surface too.
+    pub(super) fn weights(&self) -> Image {
+        let mut weights = self.coverage.clone();
+        for (pixel, covered) in weights.data_mut().iter_mut().enumerate() {
+            *covered *= self.weight(pixel);
+        }
+        for (ghost, _) in self.surface.beyond_seams.ghosts() {
+            weights.data_mut()[*ghost] = 0.0;
+        }
+        weights
     }
-    for (ghost, _) in surface.beyond_seams.ghosts() {
-        weights.data_mut()[*ghost] = 0.0;
-    }
-    weights
 }
 
 /// One painting, or one for each layer.

@@ -8,7 +8,6 @@ use paint_net::path::Stroke;
 use paint_net::{Painting, Spray};
 
 use super::colour_rows::{PaintRows, on_page};
-use super::decide::weight;
 use super::error::MissionError;
 use super::painting_task::PaintingTask;
 use super::picture_task::PictureTask;
@@ -83,7 +82,8 @@ pub(super) fn decide_colours(task: &PaintingTask, picture: &mut PictureTask) -> 
 
 /// How much each texel matters.
 pub(super) fn weights(task: &PaintingTask, picture: &PictureTask) -> Vec<f64> {
-    picture.pixels.iter().map(|&pixel| weight(task, pixel)).collect()
+    let canvas = task.canvas();
+    picture.pixels.iter().map(|&pixel| canvas.weight(pixel)).collect()
 }
 
 /// CIELAB of every texel with these depths, paint after paint.

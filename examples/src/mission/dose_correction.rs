@@ -7,7 +7,7 @@ use paint_net::painters::{DoseCorrection, DoseFootprint, SurfaceFootprint, Volum
 use paint_planner::{Plan, Target};
 use paint_sim::{Film, Shot};
 
-use super::decide::{ceiling, weight, weights};
+use super::decide::ceiling;
 use super::error::MissionError;
 use super::nozzle::{kernel, spray_model};
 use super::painting_task::PaintingTask;
@@ -34,7 +34,7 @@ pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], task: &Paint
     let ink = task.appearance.ink();
     let wanted: Vec<f64> = pixels.iter().map(|&k| ink.inverse(task.wanted.data()[k]) * UNIT_THICKNESS).collect();
     let in_reach = |place: usize| task.in_reach[pixels[place]];
-    let weigh = |(place, texel): (usize, &paint_sim::Texel)| texel.area * weight(task, pixels[place]);
+    let weigh = |(place, texel): (usize, &paint_sim::Texel)| texel.area * task.canvas().weight(pixels[place]);
     let weight: Vec<f64> = texels.iter().enumerate().map(weigh).collect();
     let film = Film::new(texels)?;
     let sprayed = sprayed(flights);
@@ -72,7 +72,7 @@ pub(super) fn correct_ink(flights: &mut [(&mut [Target], &Plan)], task: &Paintin
     let footprints: Vec<SurfaceFootprint> =
         shares.iter().map(|of_target| of_target.iter().map(depth).collect()).collect();
 
-    let (weight, ceiling) = (weights(task), ceiling(&task.wanted, surface)?);
+    let (weight, ceiling) = (task.canvas().weights(), ceiling(&task.wanted, surface)?);
     let problem = PaintProblem::new(&task.wanted)
         .with_weight(&weight)
         .with_ceiling(&ceiling)

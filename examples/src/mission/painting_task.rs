@@ -10,7 +10,7 @@ use paint_sim::render::Coat;
 use paint_sim::{Film, Substrate, Texel, TriangleSurface};
 use ptu_kinematics::Ptu;
 
-use super::decide::decide;
+use super::decide::{Canvas, decide};
 use super::error::MissionError;
 use super::planned_robot::PlannedRobot;
 use super::reach::{texels_in_reach, texels_lost_to_constraints};
@@ -90,7 +90,7 @@ impl PaintingTask {
         for (k, ink) in wanted.data_mut().iter_mut().enumerate() {
             *ink *= if task.clean[k] { 0.0 } else { task.coverage.data()[k] };
         }
-        task.layers = decide(&wanted, &task)?;
+        task.layers = decide(&wanted, &task.canvas())?;
         task.wanted = wanted;
         Ok(task)
     }
@@ -158,6 +158,12 @@ impl PaintingTask {
             truth: None,
             map: None,
         })
+    }
+
+    /// What the painter decides about.
+    pub(super) fn canvas(&self) -> Canvas<'_> {
+        let Self { surface, coverage, in_reach, clean, appearance, settings, .. } = self;
+        Canvas { surface, coverage, in_reach, clean, appearance, settings }
     }
 
     /// The same with another paint in the tank, on another wall.

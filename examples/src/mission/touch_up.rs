@@ -62,7 +62,7 @@ pub(super) fn touch_up(
         return Ok((Flown::default(), figures));
     }
     let wanted = missing.map(|depth| task.appearance.ink().forward(depth));
-    let decided = decide(&wanted, task);
+    let decided = decide(&wanted, &task.canvas());
     let layers = match decided {
         Err(MissionError::NothingToPaint(_)) => return Ok((Flown::default(), figures)),
         other => other?,

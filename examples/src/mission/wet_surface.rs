@@ -15,7 +15,7 @@ const WINDOW_S: f64 = 10.0;
 /// Share of the thickness at which paint runs that a coat may have.
 const BELOW_SAG: f64 = 0.9;
 /// Share of the painted area that may run before another coat is flown over all of it.
-const SLIVER: f64 = 0.005;
+const SLIVER: f64 = 0.02;
 
 /// The texels of a task with their paint.
 pub(super) struct WetSurface {
@@ -187,7 +187,7 @@ mod tests {
         let mut depths = decided_depth(&task).data().to_vec();
         depths.sort_by(f64::total_cmp);
         // Texels are as large as each other.
-        let deepest = depths[depths.len() - 1 - depths.len() / 200];
+        let deepest = depths[depths.len() - 1 - depths.len() / 50];
         let stays = deepest * UNIT_THICKNESS / 1.6;
         task.paint.liquid.yield_stress = stays * 1200.0 * 9.81 / (0.9 * 0.35);
         let in_one = {

@@ -9,6 +9,7 @@ mod flow;
 mod ground;
 mod liquid_balance;
 mod wet_paint;
+mod wet_state;
 
 pub use descents::Side;
 pub use flow::Flow;
@@ -17,6 +18,7 @@ pub use liquid_balance::LiquidBalance;
 pub use wet_paint::WetPaint;
 
 use descents::Descents;
+use wet_state::WetState;
 
 use super::{Film, MassBalance};
 use crate::error::{Error, check_not_negative};
@@ -32,21 +34,7 @@ const LONGEST_STEP: f64 = 5.0;
 /// The film's own volumes are those of the paint that stays (its solids); the solvent is counted beside them. Paint that is dry to touch
 /// is part of the wall for what is sprayed onto it later.
 #[derive(Debug, Clone)]
-pub struct WetFilm {
-    film: Film,
-    paint: WetPaint,
-    ground: Ground,
-    descents: Descents,
-    /// Solids that are dry to touch, per texel.
-    dry: Vec<u64>,
-    solvent: Vec<u64>,
-    /// Liquid in the pores of the ground.
-    soaked: Vec<u64>,
-    ran: Vec<bool>,
-    balance: LiquidBalance,
-    /// The largest rate of a wave over a texel, 1/s, where nothing has come since.
-    fastest: Option<f64>,
-}
+pub struct WetFilm(WetState);
 
 impl WetFilm {
     /// `film` with nothing wet on it: what it holds is dry. `sides` are the sides of its texels; between texels that have none nothing runs.
@@ -59,7 +47,7 @@ impl WetFilm {
         let descents = Descents::new(film.texels(), sides, &paint)?;
         let count = film.texels().len();
         let dry = film.volumes.clone();
-        Ok(Self {
+        Ok(Self(WetState {
             film,
             paint,
             ground,
@@ -70,7 +58,7 @@ impl WetFilm {
             ran: vec![false; count],
             balance: LiquidBalance::default(),
             fastest: Some(0.0),
-        })
+        }))
     }
 
     /// Sprays `shots`, whose volumes are solids as everywhere, with the solvent of the can; see [`Film::deposit`].
@@ -85,8 +73,8 @@ impl WetFilm {
         threads: usize,
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<MassBalance, Error> {
-        self.fastest = None;
-        let Self { film, paint, solvent, balance, .. } = self;
+        self.0.fastest = None;
+        let WetState { film, paint, solvent, balance, .. } = &mut self.0;
         let landed = &mut |texel: u32, solids: u64| {
             let with = paint.solvent_of(solids);
             solvent[texel as usize] += with;
@@ -108,52 +96,53 @@ impl WetFilm {
             if self.is_dry() {
                 break;
             }
-            flow = flow.and(self.advance(seconds / pieces));
+            flow = flow.and(self.0.advance(seconds / pieces));
         }
         Ok(flow)
     }
 
     /// The film: thickness and volumes of the solids, wet and dry.
     pub fn film(&self) -> &Film {
-        &self.film
+        &self.0.film
     }
 
     /// The same with what was wet as if it were dry.
     pub fn into_film(self) -> Film {
-        self.film
+        self.0.film
     }
 
     /// Thickness of what is wet on texel `index`, solids and solvent, m; zero where there is no such texel.
     pub fn wet_thickness(&self, index: usize) -> f64 {
-        match (self.wet_solids(index), self.film.texels().get(index)) {
-            (Some(solids), Some(texel)) => (solids + self.solvent[index]) as f64 * QUANTUM / texel.area,
+        match (self.wet_solids(index), self.0.film.texels().get(index)) {
+            (Some(solids), Some(texel)) => (solids + self.0.solvent[index]) as f64 * QUANTUM / texel.area,
             _ => 0.0,
         }
     }
 
     /// Time in which all is dry to touch, s, at most (the ground makes it shorter); infinite where no solvent evaporates.
     pub fn time_to_dry(&self) -> f64 {
-        let left =
-            |k: usize| self.solvent[k] as f64 - self.paint.solvent_left() * (self.film.volumes[k] - self.dry[k]) as f64;
-        let thickness = |k: usize| left(k) * QUANTUM / self.film.texels()[k].area;
-        let wet = (0..self.solvent.len()).filter(|&k| self.solvent[k] > 0).map(thickness).fold(0.0, f64::max);
-        if wet > 0.0 { wet / self.paint.evaporation } else { 0.0 }
+        let left = |k: usize| {
+            self.0.solvent[k] as f64 - self.0.paint.solvent_left() * (self.0.film.volumes[k] - self.0.dry[k]) as f64
+        };
+        let thickness = |k: usize| left(k) * QUANTUM / self.0.film.texels()[k].area;
+        let wet = (0..self.0.solvent.len()).filter(|&k| self.0.solvent[k] > 0).map(thickness).fold(0.0, f64::max);
+        if wet > 0.0 { wet / self.0.paint.evaporation } else { 0.0 }
     }
 
     /// Whether nothing is wet.
     pub fn is_dry(&self) -> bool {
-        self.solvent.iter().all(|&solvent| solvent == 0)
+        self.0.solvent.iter().all(|&solvent| solvent == 0)
     }
 
     /// Texels from which paint has run.
     pub fn ran(&self) -> &[bool] {
-        &self.ran
+        &self.0.ran
     }
 
     /// Share by area of the painted texels from which paint has run; zero without paint.
     pub fn share_ran(&self) -> f64 {
         let (mut painted, mut ran) = (0.0, 0.0);
-        for ((texel, &volume), &runs) in self.film.texels().iter().zip(&self.film.volumes).zip(&self.ran) {
+        for ((texel, &volume), &runs) in self.0.film.texels().iter().zip(&self.0.film.volumes).zip(&self.0.ran) {
             if volume > 0 || runs {
                 painted += texel.area;
                 ran += if runs { texel.area } else { 0.0 };
@@ -164,10 +153,10 @@ impl WetFilm {
 
     /// Where the solvent went; that of the solids is [`Film::mass_balance`].
     pub fn liquid_balance(&self) -> LiquidBalance {
-        LiquidBalance { on_surface: self.solvent.iter().sum(), soaked: self.soaked.iter().sum(), ..self.balance }
+        LiquidBalance { on_surface: self.0.solvent.iter().sum(), soaked: self.0.soaked.iter().sum(), ..self.0.balance }
     }
 
     fn wet_solids(&self, index: usize) -> Option<u64> {
-        Some(self.film.volumes.get(index)? - self.dry[index])
+        Some(self.0.film.volumes.get(index)? - self.0.dry[index])
     }
 }

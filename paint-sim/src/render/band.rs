@@ -4,13 +4,11 @@ use nalgebra::{Point3, Vector3};
 
 use super::camera::Camera;
 use super::lights::Lights;
-use super::seen::Seen;
+use super::seen::{MAX_RAY_LENGTH, Seen};
 use super::shading::Shading;
 use crate::colour::encode_srgb8;
 use crate::surface::{Hit, Surface};
 
-/// Rays end here, m: beyond it there is only background.
-pub(super) const MAX_RAY_LENGTH: f64 = 1e4;
 /// Rays along the edge of a tile: few triangles are in so narrow a pyramid, and many rays share them.
 const TILE: u32 = 8;
 

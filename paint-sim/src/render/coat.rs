@@ -1,18 +1,15 @@
 //! Gloss: a clear dielectric coat over the matt paint.
 
 mod albedo;
+mod microfacets;
 
 use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
 use self::albedo::AlbedoTable;
+use self::microfacets::{LEAST_COSINE, fresnel, shadowing};
 use crate::error::{Error, check_range};
-
-/// Refractive index of the coat: that of the binders of paint.
-const INDEX: f64 = 1.5;
-/// Below this cosine to the eye or a light everything looks as it does here.
-const LEAST_COSINE: f64 = 1e-3;
 
 /// A rough coat of refractive index 1.5 (GGX microfacets: Walter, Marschner, Li, Torrance 2007). What it reflects does not reach the
 /// paint below, which is coupled to it so that no light is lost or made (Kelemen and Szirmay-Kalos 2001).
@@ -70,18 +67,4 @@ impl Coat {
 fn facets(alpha2: f64, cosine: f64) -> f64 {
     let flat = cosine * cosine * (alpha2 - 1.0) + 1.0;
     alpha2 / (PI * flat * flat)
-}
-
-/// Smith's joint shadowing and masking for GGX.
-fn shadowing(alpha2: f64, eye: f64, light: f64) -> f64 {
-    let reach = |cosine: f64| (alpha2 + (1.0 - alpha2) * cosine * cosine).sqrt();
-    2.0 * eye * light / (eye * reach(light) + light * reach(eye))
-}
-
-/// Fresnel reflectance of unpolarised light.
-fn fresnel(cosine: f64) -> f64 {
-    let g = (INDEX * INDEX - 1.0 + cosine * cosine).sqrt();
-    let across = (g - cosine) / (g + cosine);
-    let along = (cosine * (g + cosine) - 1.0) / (cosine * (g - cosine) + 1.0);
-    0.5 * across * across * (1.0 + along * along)
 }

@@ -2,11 +2,13 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::band::MAX_RAY_LENGTH;
 use super::coat::Coat;
 use super::lights::Lights;
 use super::shading::Shading;
 use crate::surface::Surface;
+
+/// Rays end here, m: beyond it there is only background.
+pub(super) const MAX_RAY_LENGTH: f64 = 1e4;
 
 /// A point that the camera sees.
 pub(super) struct Seen {

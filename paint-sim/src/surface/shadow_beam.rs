@@ -123,6 +123,6 @@ impl Blocker {
         let (normal, margin) = (edges.normal(), MARGIN * farthest.powi(3));
         let height = normal.dot(&corners[0]);
         let (normal, height) = (normal * height.signum(), height.abs());
-        (height > 2.0 * margin).then(|| Self { edges, normal, height: height - margin })
+        (height > 2.0 * margin).then_some(Self { edges, normal, height: height - margin })
     }
 }

@@ -1,9 +1,9 @@
 //! One pass over the texels: what leaves each as solvent, and what runs on.
 
 use super::super::Film;
-use super::WetFilm;
 use super::descents::Downhill;
 use super::wet_paint::{GRAVITY, WetPaint};
+use super::wet_state::WetState;
 use crate::spray::QUANTUM;
 
 /// Share of the way over a texel that the fastest wave may go in a step; what gathers between two looks may be twice as fast.
@@ -26,7 +26,7 @@ impl Flow {
     }
 }
 
-impl WetFilm {
+impl WetState {
     /// Dries and runs for a time over which stiffness hardly changes: first order, upwind, explicit.
     pub(super) fn advance(&mut self, seconds: f64) -> Flow {
         let mut flow = Flow::default();

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
-use super::{LEAST_COSINE, fresnel, shadowing};
+use super::microfacets::{LEAST_COSINE, fresnel, shadowing};
 
 /// Parts of the table along roughness, and along the root of the cosine, as it is steep where one looks along the surface.
 const ROUGHNESSES: usize = 16;
