@@ -6,6 +6,7 @@ mod identified;
 mod localisation;
 mod pictures;
 mod reach;
+mod team;
 mod times;
 
 use std::fmt::Write as _;
@@ -16,11 +17,12 @@ use serde::Serialize;
 use crate::whole_file;
 
 pub use check::{Check, Requirement, Unit};
-pub use film::FilmFigures;
+pub use film::{CleanFigures, FilmFigures};
 pub use identified::IdentifiedFigures;
 pub use localisation::LocalisationReport;
 use pictures::PICTURES;
 pub use reach::ReachNeeds;
+pub use team::TeamFigures;
 pub use times::TimeFigures;
 pub(crate) use times::not_flown;
 
@@ -89,6 +91,9 @@ pub struct Report {
     pub path_length_m: f64,
     /// Time in the air.
     pub flight_time_s: f64,
+    /// Who flies.
+    #[serde(flatten)]
+    pub team: TeamFigures,
     /// What makes it that long.
     #[serde(flatten)]
     pub times: TimeFigures,
@@ -340,7 +345,7 @@ impl Report {
             self.seed,
             self.version
         );
-        text += &(times::in_sorties(self.sorties) + &not_flown(self.not_flown_s));
+        text += &(self.team.summary() + &times::in_sorties(self.sorties) + &not_flown(self.not_flown_s));
         for (file, caption) in PICTURES {
             if folder.join(file).exists() {
                 let _ = writeln!(text, "**{caption}**\n\n![{caption}]({file})\n");

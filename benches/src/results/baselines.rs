@@ -64,8 +64,7 @@ impl Column {
 }
 
 fn statistics(flights: &[FlightLog]) -> FlightStatistics {
-    let samples: Vec<FlightSample> = flights.iter().flat_map(|log| log.samples.iter().copied()).collect();
-    FlightStatistics::of(&samples)
+    FlightStatistics::of(&flights.iter().map(|log| log.samples.as_slice()).collect::<Vec<_>>())
 }
 
 /// Yaw and pitch of the gun's axis off those that the plan has at this time, degrees.

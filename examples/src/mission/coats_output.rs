@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::coats::{Coats, Look, PaintTime, Wall, linear, time_of_paints};
 use super::error::MissionError;
 use super::figures::mean;
-use super::kept_clean::KeptClean;
+use super::kept_clean::kept_clean;
 use super::mission_output::{save, save_flights, save_flown_path};
 use super::painted_mesh::save_painted_mesh;
 use super::painted_views::save_painted_views;
@@ -23,7 +23,7 @@ use super::shading::shading_of_colours;
 use super::written_file::{unwritable, write};
 use crate::pictures::{COLOUR_DIFFERENCE, Rgb, save_error_map};
 use crate::progress::Stage;
-use crate::report::{Report, not_flown, save_figures};
+use crate::report::{CleanFigures, Report, TeamFigures, not_flown, save_figures};
 
 /// Depth from which a paint counts as wanted.
 const WANTED: f64 = 0.05;
@@ -51,6 +51,9 @@ pub struct CoatsFigures {
     pub ssim_painted_by_paint: Vec<f64>,
     /// Time in the air.
     pub flight_time_s: f64,
+    /// Who flies.
+    #[serde(flatten)]
+    pub team: TeamFigures,
     /// Times that the tank is changed.
     pub tool_changes: usize,
     /// From the first start to the last landing: in the air, and on the ground while a film dries and the tank is changed.
@@ -64,15 +67,9 @@ pub struct CoatsFigures {
     pub paint_deposited_kg: f64,
     /// Share by area of the painted surface on which a paint was so thick that it ran.
     pub sagging_share: f64,
-    /// Area that stays clean.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub kept_clean_m2: Option<f64>,
-    /// Mean thickness of all paints there nevertheless.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub kept_clean_thickness_mean_m: Option<f64>,
-    /// Share of that area with a micrometre or more.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub kept_clean_soiled_share: Option<f64>,
+    /// What should stay clean.
+    #[serde(flatten)]
+    pub clean: CleanFigures,
     /// Strokes of all.
     pub strokes: usize,
     /// Moments at which the flown robot touched the surface.
@@ -101,6 +98,7 @@ impl CoatsFigures {
             );
         }
         let (minutes, difference) = (self.flight_time_s / 60.0, self.ciede2000_mean_where_wanted);
+        text += &self.team.summary();
         let hours = self.mission_time_s / 3600.0;
         let _ = writeln!(
             text,
@@ -119,7 +117,7 @@ impl CoatsFigures {
              | paint | results | minutes | kg | not planned | SSIM |\n|---|---|---|---|---|---|\n",
             self.surface,
             self.paints.len(),
-            not_flown(self.not_flown_s),
+            self.team.summary() + &not_flown(self.not_flown_s),
             self.ciede2000_mean,
             self.ciede2000_mean_where_wanted,
             self.collisions,
@@ -227,7 +225,6 @@ fn figures(coats: &Coats, reports: &[Report], wanted: &[Option<Look>], painted: 
     };
     let times: Vec<PaintTime> = flight_times.iter().zip(coats.missions()).map(time).collect();
     let missions: Vec<&Mission> = coats.missions().map(|(_, mission)| mission).collect();
-    let clean = KeptClean::of(&missions);
     let name = |folder: &Path| folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     CoatsFigures {
         version: env!("CARGO_PKG_VERSION"),
@@ -240,15 +237,14 @@ fn figures(coats: &Coats, reports: &[Report], wanted: &[Option<Look>], painted: 
         unreachable_paint_share_by_paint: of(|r| r.unreachable_paint_share),
         ssim_painted_by_paint: of(|r| r.ssim_painted),
         flight_time_s: sum(|r| r.flight_time_s),
+        team: TeamFigures::of_all(reports.iter().map(|report| report.team)),
         tool_changes: times.len().saturating_sub(1),
         mission_time_s: time_of_paints(&times),
         not_flown_s: coats.grounded().map(|grounded| grounded.left_s),
         path_length_m: sum(|r| r.path_length_m),
         paint_deposited_kg: sum(|r| r.paint_deposited_kg),
         sagging_share: sagging_share(&missions),
-        kept_clean_m2: clean.map(|clean| clean.area),
-        kept_clean_thickness_mean_m: clean.map(|clean| clean.thickness),
-        kept_clean_soiled_share: clean.map(|clean| clean.soiled),
+        clean: kept_clean(&missions),
         strokes: reports.iter().map(|r| r.strokes).sum(),
         collisions: reports.iter().map(|r| r.collisions).sum(),
         limit_violations: reports.iter().map(|r| r.limit_violations).sum(),

@@ -104,6 +104,12 @@ pub enum MissionError {
     /// The design asks for nothing that can be painted.
     #[error("the design leaves nothing to paint: {0}")]
     NothingToPaint(&'static str),
+    /// Several robots on one tether.
+    #[error(
+        "several robots (--robots) cannot hang from one anchor, as their hoses would cross: leave `settings.constraints.tether` out; each hose \
+         then comes from the ground behind its robot"
+    )]
+    TeamTethered,
     /// The flight would not fit into memory.
     #[error(
         "a surface of {area:.0} m² needs about {need_gib:.1} GiB of memory, more than --memory-gib {limit_gib}: paint it \

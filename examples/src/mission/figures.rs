@@ -3,19 +3,21 @@
 use paint_net::{ideal, metrics};
 use paint_planner::Plan;
 use paint_sim::flight::FlightLog;
-use paint_sim::flight::{FlightSample, FlightStatistics};
+use paint_sim::flight::FlightStatistics;
 use paint_sim::spray::QUANTUM;
 
 use super::collisions::collisions;
+use super::compared_flight::hit_error_rms;
 use super::darker_than_wanted;
 use super::error::MissionError;
 use super::fly::LayerFlight;
 use super::inspect::Inspection;
-use super::kept_clean::KeptClean;
+use super::kept_clean::kept_clean;
 use super::run::Mission;
 use super::sagging::sagging_share;
 use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
+use super::team::flown_team;
 use crate::adapters::MeshSurface;
 use crate::onboard::LocalisationFigures;
 use crate::report::{FilmFigures, LocalisationReport, Report, TimeFigures, peak_resident_bytes};
@@ -27,12 +29,10 @@ const LIMIT_STEP: f64 = 0.02;
 pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, MissionError> {
     let quality = mission.task.surface.chart.quality();
     let deviations = normal_deviations(mission);
-    let flown = statistics(&mission.flights, |f| &f.flight);
-    let slam = statistics(&mission.flights, |f| &f.slam);
-    let locked = statistics(&mission.flights, |f| &f.locked);
+    let flown = FlightStatistics::of(&mission.flights.iter().map(|f| f.flight.samples.as_slice()).collect::<Vec<_>>());
     let own = mission.flights.iter().filter_map(|f| f.localisation).reduce(LocalisationFigures::and);
     let planned_time: f64 = mission.flights.iter().map(|f| f.plan.trajectory.duration()).sum();
-    let flight_time: f64 = mission.flights.iter().map(LayerFlight::duration).sum();
+    let in_the_air: f64 = mission.flights.iter().map(LayerFlight::duration).sum();
     let path: f64 = mission.flights.iter().map(|f| f.plan.path_length()).sum();
 
     let balance = mission.film.mass_balance();
@@ -73,15 +73,16 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         targets_left_bare: mission.left_bare,
         hit_error_rms_m: flown.hit_error_rms,
         hit_error_p95_m: flown.hit_error_p95,
-        hit_error_rms_slam_m: slam.hit_error_rms,
+        hit_error_rms_slam_m: hit_error_rms(mission.flights.iter().map(|f| &f.slam)),
         nozzle_distance_std_m: flown.nozzle_distance_std,
-        ptu_locked_hit_error_rms_m: locked.hit_error_rms,
+        ptu_locked_hit_error_rms_m: hit_error_rms(mission.flights.iter().map(|f| &f.locked)),
         pan_error_rms_rad: flown.pan_error_rms,
         tilt_error_rms_rad: flown.tilt_error_rms,
         planning_s_per_m: mission.planning / path,
         planning_per_flight_time: mission.planning / planned_time,
         path_length_m: path,
-        flight_time_s: flight_time,
+        flight_time_s: mission.flight_time(),
+        team: flown_team(mission),
         times: TimeFigures::of(mission.flights.iter().map(|f| &f.plan), &mission.task.settings.planner.timing),
         valve_open_share: mission.flights.iter().map(|f| f.plan.open_time()).sum::<f64>() / planned_time,
         valve_held_share: share_held(mission),
@@ -112,7 +113,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         fill_thin_share: fill.as_ref().map(|f| f.thin),
         fill_deviation: fill.as_ref().map(|f| f.deviation),
         fill_mean_ratio: fill.as_ref().map(|f| f.mean),
-        localisation: own.map(|own| LocalisationReport::of(&own, flight_time)),
+        localisation: own.map(|own| LocalisationReport::of(&own, in_the_air)),
         sorties: mission.sorties(),
         not_flown_s: mission.grounded.as_ref().map(|grounded| grounded.left_s),
         film: film_figures(mission),
@@ -129,12 +130,10 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
 }
 
 fn film_figures(mission: &Mission) -> FilmFigures {
-    let (clean, looked) = (KeptClean::of(&[mission]), &mission.looked);
+    let looked = &mission.looked;
     FilmFigures {
         sagging_share: sagging_share(&[mission]),
-        kept_clean_m2: clean.map(|clean| clean.area),
-        kept_clean_thickness_mean_m: clean.map(|clean| clean.thickness),
-        kept_clean_soiled_share: clean.map(|clean| clean.soiled),
+        clean: kept_clean(&[mission]),
         film_estimate_error_share: looked.map(|looked| looked.film_error),
         film_estimate_seen_share: looked.map(|looked| looked.film_seen),
         paint_missing_kg: looked.map(|looked| looked.missing * mission.task.paint.liquid.density),
@@ -224,12 +223,6 @@ struct Deviations {
     max: f64,
     smoothing_mean: f64,
     unreachable: f64,
-}
-
-/// The statistics over all layers of one kind of flight.
-fn statistics(flights: &[LayerFlight], of: impl Fn(&LayerFlight) -> &FlightLog) -> FlightStatistics {
-    let samples: Vec<FlightSample> = flights.iter().flat_map(|f| of(f).samples.iter().copied()).collect();
-    FlightStatistics::of(&samples)
 }
 
 pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {

@@ -1,8 +1,8 @@
 //! The sensors of a simulated flight: its camera before surface and paint, and what says where the robot is.
 
 use nalgebra::Vector3;
-use paint_sim::FlightSettings;
-use paint_sim::flight::{FlightLog, PoseSensor, PoseSource};
+use paint_sim::flight::{PoseSensor, PoseSource};
+use paint_sim::{FlightSettings, Shot};
 
 use super::error::MissionError;
 use super::nozzle::spray_model;
@@ -10,18 +10,17 @@ use super::painting_task::PaintingTask;
 use super::settings::LocalisationChoice;
 use super::simulated_flight::noise;
 use crate::onboard::{LocalisationFigures, LocalisedFlight, read_map};
-use crate::simulated_sensors::{FaultInterval, PaintedFront, SHOT_STEP, SimulatedCamera};
+use crate::simulated_sensors::{FaultInterval, PaintedFront, SimulatedCamera};
 
-/// The camera before the true surface with the paint of flights on it. Surfaces are turned so that they face the robot, which is at smaller x.
-pub(super) fn camera_before<'a, 'b>(
-    task: &'a PaintingTask,
-    flights: impl Iterator<Item = &'b FlightLog>,
-) -> Result<SimulatedCamera<'a>, MissionError> {
+/// The camera before the true surface with the paint of shots on it. Surfaces are turned so that they face the robot, which is at smaller x.
+pub(super) fn camera_before(
+    task: &PaintingTask,
+    shots: impl Iterator<Item = Shot>,
+) -> Result<SimulatedCamera<'_>, MissionError> {
     let PaintingTask { settings, .. } = task;
     let towards = Vector3::x_axis();
     let mut painted = PaintedFront::new(task.met(), &towards, spray_model(settings), &task.paint.paint)?;
-    let shots: Vec<_> = flights.flat_map(|flight| flight.shots(SHOT_STEP)).collect();
-    painted.spray(&shots, task.met(), settings.threads)?;
+    painted.spray(&shots.collect::<Vec<_>>(), task.met(), settings.threads)?;
     // The same light and stone as in the scan.
     Ok(SimulatedCamera::new(task.met(), towards.into_inner(), settings.seed, settings.threads).before(painted))
 }

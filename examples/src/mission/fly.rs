@@ -1,31 +1,29 @@
-//! Flying it, and what the paint does meanwhile.
+//! Flying it.
 
-use paint_net::Image;
 use paint_planner::Plan;
-use paint_planner::mission::Route;
+use paint_planner::mission::{Route, Turn};
 use paint_planner::onboard::sorties;
 use paint_sim::flight::FlightLog;
-use paint_sim::flight::{Faults, Localisation, Reference};
-use paint_sim::{FlightSettings, TriangleSurface};
+use paint_sim::flight::{Faults, Reference};
+use paint_sim::{FlightSettings, Shot};
 
+use super::compared_flight::{COMPARED, ComparedFlight, fly_beside};
 use super::error::MissionError;
-use super::flight_conditions::{counted_flight, usual_flight};
+use super::flight_conditions::counted_flight;
 use super::flight_sensors::{Poses, camera_before};
 use super::flyer::{Flight, Flyer, Purpose};
 use super::grounded::Grounded;
 use super::painting_task::PaintingTask;
-use super::plan::Planned;
+use super::plan::{Planned, PlannedLayer};
 use super::settings::MissionSettings;
-use super::simulated_flight::{fly_plan, reference};
+use super::simulated_flight::reference;
 use super::sorties::{FlownPiece, Sorties, in_pieces};
-use super::wet_surface::{DriedSurface, WetSurface};
-use crate::adapters::Robot;
+use super::spray_flights::FlownPaint;
+use super::trajectory_table::TRAJECTORY_STEP;
 use crate::onboard::{LocalisationFigures, Piece};
 use crate::progress::Stage;
 use crate::simulated_sensors::SHOT_STEP;
 
-/// Parts of the spraying after which the surface is shown.
-const PARTS: usize = 3;
 /// Flights of other sorties have seeds so far apart.
 const SORTIE: u64 = 0x1_0000;
 
@@ -37,26 +35,44 @@ pub struct LayerFlight {
     pub plan: Plan,
     /// The baseline planner on the same targets.
     pub smoothing: Plan,
-    /// Flown with the localisation that was chosen: the flight whose paint counts.
+    /// Flown with the localisation that was chosen: the flight whose paint counts, twenty times a second.
     pub flight: FlightLog,
+    /// What it sprayed, with times, s; nothing once that is on the surface.
+    pub(super) shots: Vec<(f64, Shot)>,
+    /// When its last sample was, s.
+    pub(super) landed: f64,
     /// What its localisation was worth, if that was the robot's own.
     pub(super) localisation: Option<LocalisationFigures>,
     /// Pieces that tank, battery, or what ended one in the air have cut it into.
     pub(super) sorties: usize,
     /// Time of the plan that was not flown, s: a later sortie could not be.
     pub(super) left_s: f64,
+    /// Who has flown it.
+    pub turn: Turn,
+    /// When it begins, s after the first flight of the mission, without the time on the ground between coats.
+    pub(super) start: f64,
     /// Whether the paint before it is dry when it begins.
     pub(super) on_dry: bool,
     /// Flown with a localisation that errs by 7 cm.
-    pub slam: FlightLog,
+    pub slam: ComparedFlight,
     /// The baseline's plan flown with pan and tilt at zero (Paper II, section 7.2).
-    pub locked: FlightLog,
+    pub locked: ComparedFlight,
 }
 
 impl LayerFlight {
     /// Time of the plan that was flown, s.
     pub(super) fn duration(&self) -> f64 {
         self.plan.trajectory.duration() - self.left_s
+    }
+
+    /// When it ends, s after the first flight of the mission begins.
+    pub(super) fn end(&self) -> f64 {
+        self.start + self.duration()
+    }
+
+    /// What it sprays.
+    pub(super) fn paint(&self) -> FlownPaint<'_> {
+        FlownPaint { shots: &self.shots, duration: self.landed, start: self.start, on_dry: self.on_dry }
     }
 }
 
@@ -83,8 +99,9 @@ pub(super) fn fly(
     let mut flights = Vec::with_capacity(count);
     let mut grounded: Option<Grounded> = None;
     let mut faulty = task.settings.clone();
+    let (begun, coat) = (before.iter().map(LayerFlight::end).fold(0.0, f64::max), planned.coat_duration());
     let coats = std::iter::repeat_n(planned.layers, planned.coats).flatten();
-    for (k, (route, plan, smoothing)) in coats.enumerate() {
+    for (k, PlannedLayer { route, plan, smoothing, turn, start }) in coats.enumerate() {
         if let Some(grounded) = &mut grounded {
             grounded.left_s += plan.trajectory.duration();
             continue;
@@ -96,14 +113,15 @@ pub(super) fn fly(
             faulty.sensor_faults.clear();
         }
         let mut told = Sorties::default();
-        let logs: Vec<&FlightLog> = before.iter().chain(&flights).map(|layer| &layer.flight).collect();
+        let sprayed: Vec<&LayerFlight> = before.iter().chain(&flights).collect();
         let counted = || {
-            let (flight, sorties) = fly_sorties(&plan, task, &faulty, layer as u64, &logs, flyer, &share)?;
+            let (flight, sorties) = fly_sorties(&plan, task, &faulty, layer as u64, &sprayed, flyer, &share)?;
             told = sorties;
-            Ok(flight)
+            let landed = flight.samples.last().map_or(0.0, |sample| sample.time);
+            Ok((flight.timed_shots(SHOT_STEP), landed, flight.thinned(TRAJECTORY_STEP)))
         };
         match fly_beside([&plan, &smoothing], task.met(), &task.robot, &faulty, layer as u64, counted) {
-            Ok([flight, slam, locked]) => {
+            Ok(((shots, landed, flight), [slam, locked])) => {
                 let Sorties { localisation, count: sorties, ended } = told;
                 let left_s = ended.as_ref().map_or(0.0, |ended| ended.left_s);
                 grounded = ended;
@@ -112,9 +130,13 @@ pub(super) fn fly(
                     plan,
                     smoothing,
                     flight,
+                    shots,
+                    landed,
                     localisation,
                     sorties,
                     left_s,
+                    turn,
+                    start: begun + (k / each) as f64 * coat + start,
                     on_dry: layer > 0 && k % each == 0,
                     slam,
                     locked,
@@ -125,7 +147,9 @@ pub(super) fn fly(
         }
     }
     let seconds: f64 = flights.iter().map(LayerFlight::duration).sum();
-    stage.done(&format!("{:.0} min in the air, three times", seconds / 60.0));
+    let longest = flights.iter().map(LayerFlight::duration).fold(0.0, f64::max);
+    let times = if longest > COMPARED { ", two more times for half an hour of each flight" } else { ", three times" };
+    stage.done(&format!("{:.0} min in the air{times}", seconds / 60.0));
     Ok(Flown { layers: flights, grounded })
 }
 
@@ -136,7 +160,7 @@ fn fly_sorties(
     task: &PaintingTask,
     settings: &MissionSettings,
     layer: u64,
-    before: &[&FlightLog],
+    before: &[&LayerFlight],
     flyer: &mut dyn Flyer,
     share: &dyn Fn(f64),
 ) -> Result<(FlightLog, Sorties), MissionError> {
@@ -158,7 +182,10 @@ fn fly_sorties(
         let from = piece.map_or(0.0, |piece| piece.from);
         let piece = piece.map(|sortie| Piece::of(&whole, sortie));
         let reference: &dyn Reference = piece.as_ref().map_or(&whole, |piece| piece);
-        let camera = || camera_before(task, before.iter().copied().chain(flown));
+        let camera = || {
+            let before = before.iter().flat_map(|flight| flight.shots.iter().map(|(_, shot)| *shot));
+            camera_before(task, before.chain(flown.map(|log| log.shots(SHOT_STEP)).into_iter().flatten()))
+        };
         let faults = if k == 0 { &settings.sensor_faults[..] } else { &[] };
         let mut poses = Poses::of(task, camera, 0, &conditions)?.with_faults(faults);
         let flight = Flight { task, purpose: Purpose::Paint, reference, conditions };
@@ -168,92 +195,17 @@ fn fly_sorties(
     })
 }
 
-/// Flights' paint on a surface.
-pub(super) struct Sprayed {
-    /// The paint.
-    pub(super) surface: DriedSurface,
-    /// Depth per pixel after each of equal parts of the spraying but the last; none of a picture's paint.
-    pub(super) before: Vec<Image>,
-}
-
-/// Puts the paint of flights onto the texels; before those marked so what is there dries.
-pub(super) fn spray<'a>(
-    flights: impl Iterator<Item = (&'a FlightLog, bool)>,
-    task: &PaintingTask,
-) -> Result<Sprayed, MissionError> {
-    let stage = Stage::start("spray");
-    let mut surface = WetSurface::new(task)?;
-    let flights: Vec<_> = flights.map(|(log, dry)| (log, log.timed_shots(SHOT_STEP), dry)).collect();
-    let total: usize = flights.iter().map(|(_, shots, _)| shots.len()).sum();
-    let part = total.div_ceil(PARTS).max(1);
-    let (mut before, mut sprayed) = (Vec::new(), 0);
-    for (k, (log, shots, _)) in flights.iter().enumerate() {
-        let mut rest = &shots[..];
-        while !rest.is_empty() {
-            let (now, later) = rest.split_at(rest.len().min(part - sprayed % part));
-            surface.spray(now, task, &|done| stage.share((sprayed + done) as f64 / total as f64))?;
-            (sprayed, rest) = (sprayed + now.len(), later);
-            // A picture's paints are shown together.
-            if sprayed % part == 0 && sprayed < total && !task.of_picture {
-                before.push(surface.depth(task));
-            }
-        }
-        let duration = log.samples.last().map_or(0.0, |sample| sample.time);
-        surface.land(duration, flights.get(k + 1).is_some_and(|next| next.2))?;
-    }
-    let surface = surface.dry()?;
-    let balance = surface.film.mass_balance();
-    let share = 100.0 * balance.deposited as f64 / balance.emitted.max(1) as f64;
-    let ran = if surface.ran.contains(&true) { ", some of which ran: see sagging.png" } else { "" };
-    stage.done(&format!("{share:.1} % of the paint on the surface{ran}"));
-    Ok(Sprayed { surface, before })
-}
-
-/// The flight whose paint counts, as it is `counted`, the same plan with a drifting localisation, and the smoothing plan with the gun locked.
-fn fly_beside(
-    [plan, smoothing]: [&Plan; 2],
-    world: &TriangleSurface,
-    robot: &Robot,
-    settings: &MissionSettings,
-    layer: u64,
-    counted: impl FnOnce() -> Result<FlightLog, MissionError>,
-) -> Result<[FlightLog; 3], MissionError> {
-    let ptu_locked = settings.path_planner.locks_gun();
-    let others = [
-        (
-            plan,
-            FlightSettings {
-                localisation: Localisation::slam_7cm(),
-                ptu_locked,
-                ..usual_flight(plan, robot, settings, layer)
-            },
-        ),
-        (smoothing, FlightSettings { ptu_locked: true, ..usual_flight(smoothing, robot, settings, layer) }),
-    ];
-    let one = |(plan, flight): &(&Plan, FlightSettings)| fly_plan(plan, world, robot, settings, flight);
-    if settings.threads < 2 {
-        let (a, [b, c]) = (counted(), others.each_ref().map(one));
-        return Ok([a?, b?, c?]);
-    }
-    std::thread::scope(|scope| {
-        let handles = others.each_ref().map(|flight| scope.spawn(move || one(flight)));
-        let a = counted();
-        let [b, c] = handles.map(|h| h.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-        Ok([a?, b?, c?])
-    })
-}
-
-/// The same in one sortie by motion capture or noise, for the tests of the mission's parts.
+/// The flight whose paint counts in one sortie by motion capture or noise, with those beside it, for the tests of the mission's parts.
 #[cfg(test)]
 pub(super) fn fly_three(
     plan: &Plan,
-    world: &TriangleSurface,
-    robot: &Robot,
+    world: &paint_sim::TriangleSurface,
+    robot: &crate::adapters::Robot,
     settings: &MissionSettings,
     layer: u64,
-) -> Result<[FlightLog; 3], MissionError> {
+) -> Result<(FlightLog, [ComparedFlight; 2]), MissionError> {
     let first = counted_flight(plan, robot, settings, layer);
-    let counted = || fly_plan(plan, world, robot, settings, &first);
+    let counted = || super::simulated_flight::fly_plan(plan, world, robot, settings, &first);
     fly_beside([plan, plan], world, robot, settings, layer, counted)
 }
 
@@ -261,14 +213,12 @@ pub(super) fn fly_three(
 mod tests {
     use paint_planner::onboard::Endurance;
     use paint_planner::timing::TimingPolicy;
-    use paint_sim::{Film, Shot};
     use ptu_kinematics::Ptu;
 
-    use super::super::nozzle::spray_model;
     use super::super::simulated_flight::{fly_reference, noise};
     use super::super::test_panel;
     use super::*;
-    use crate::region::Scene;
+    use crate::adapters::Robot;
 
     #[test]
     fn the_seed_and_the_layer_change_wind_and_localisation() {
@@ -281,34 +231,12 @@ mod tests {
             fly_three(&plan, &surface.world, &robot, &settings, layer).unwrap()
         };
         let (usual, again, other, next) = (fly(1, 0), fly(1, 0), fly(2, 0), fly(1, 1));
-        for k in 0..3 {
-            assert_eq!(usual[k], again[k]);
-            assert_ne!(usual[k], other[k], "flight {k} ignores the seed");
-            assert_ne!(usual[k], next[k], "flight {k} is the same in every layer");
-        }
-    }
-
-    /// After each third of the shots their paint lies there, and in the end what one call would have sprayed.
-    #[test]
-    fn the_paint_grows_by_thirds() {
-        let settings = MissionSettings { threads: 1, ..MissionSettings::default() };
-        let log = test_panel::flown(&settings).1;
-        let task = PaintingTask::undecided("wall", &Scene::whole(test_panel::mesh()), settings.clone()).unwrap();
-        let Sprayed { surface: DriedSurface { film, pixels, .. }, before } =
-            spray(std::iter::once((&log, false)), &task).unwrap();
-        let mut at_once = Film::new(task.film_texels().0).unwrap();
-        let shots = log.shots(SHOT_STEP);
-        at_once.deposit(&shots, &spray_model(&settings), task.met(), 1, &mut |_, _| ()).unwrap();
-        assert_eq!(film.mass_balance(), at_once.mass_balance());
-        let painted = task.depth_of(&film, &pixels);
-        assert_eq!(painted, task.depth_of(&at_once, &pixels));
-        let sum = |depth: &Image| depth.data().iter().sum::<f64>();
-        assert_eq!(before.len(), 2);
-        for (part, depth) in before.iter().enumerate() {
-            let sprayed = |shots: &[Shot]| shots.iter().map(|shot| shot.volume).sum::<f64>();
-            let share = sprayed(&shots[..(part + 1) * shots.len().div_ceil(3)]) / sprayed(&shots);
-            assert!((sum(depth) / sum(&painted) - share).abs() < 0.01, "{share} after part {part}");
-            assert!(depth.data().iter().zip(painted.data()).all(|(then, end)| then <= end));
+        assert_eq!(usual, again);
+        for (changed, why) in [(other, "ignores the seed"), (next, "is the same in every layer")] {
+            assert_ne!(usual.0, changed.0, "the flight {why}");
+            for k in 0..2 {
+                assert_ne!(usual.1[k], changed.1[k], "flight {k} beside it {why}");
+            }
         }
     }
 

@@ -13,7 +13,7 @@ use super::error::MissionError;
 use super::flight_conditions::{localisation_noise, usual_flight};
 use super::flight_sensors::{Poses, camera_before};
 use super::painting_task::PaintingTask;
-use super::plan::Planned;
+use super::plan::{Planned, PlannedLayer};
 use crate::adapters::reference_state;
 use crate::progress::Stage;
 use crate::report::IdentifiedFigures;
@@ -47,7 +47,9 @@ impl Identified {
 /// Flies an excitation behind the place where the first plan begins, if the mission asks for it, by the localisation that was chosen. What it
 /// tells is the model from then on.
 pub(super) fn identify(task: &mut PaintingTask, planned: &Planned) -> Result<Option<Identified>, MissionError> {
-    let Some((_, plan, _)) = planned.layers.first().filter(|_| task.settings.identify) else { return Ok(None) };
+    let Some(PlannedLayer { plan, .. }) = planned.layers.first().filter(|_| task.settings.identify) else {
+        return Ok(None);
+    };
     let stage = Stage::start("identify");
     let usual = usual_flight(plan, &task.robot, &task.settings, FLIGHT);
     let conditions = FlightSettings { localisation: localisation_noise(&task.settings, usual.localisation), ..usual };

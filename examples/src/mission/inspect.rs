@@ -23,8 +23,6 @@ const DISTANCE: f64 = 1.6;
 const VOXEL: f64 = 0.015;
 /// Views of a surface that faces one side: columns and rows of the grid of viewpoints.
 const GRID: (usize, usize) = (5, 3);
-/// Time between two poses of a trajectory file, seconds.
-const POSE_STEP: f64 = 0.1;
 /// Views around a surface that closes in, at each of two heights.
 const RING: usize = 12;
 
@@ -111,21 +109,19 @@ fn viewpoints(mission: &Mission) -> Result<Vec<Camera>, MissionError> {
     Ok(cameras)
 }
 
-/// The flights one after the other at 10 Hz: as flown, and as the drifting localisation saw them.
+/// What is compared of the flights, one after the other at 10 Hz: as flown, and as the drifting localisation saw them.
 fn trajectories(mission: &Mission) -> Result<(Trajectory, Trajectory), MissionError> {
     let mut flown = Trajectory::default();
     let mut estimated = Trajectory::default();
     let mut start = 0.0;
     for f in &mission.flights {
-        let stride = (POSE_STEP / f.slam.interval).round().max(1.0) as usize;
-        for sample in f.slam.samples.iter().step_by(stride) {
-            let stamp = Stamp::from_secs(start + sample.time).map_err(vio_ekf::Error::from)?;
+        for (time, world_from_body, estimated_position) in &f.slam.poses {
+            let stamp = Stamp::from_secs(start + time).map_err(vio_ekf::Error::from)?;
             if flown.stamps().last().is_some_and(|&last| last >= stamp) {
                 continue;
             }
-            flown.push(stamp, sample.world_from_body)?;
-            let rotation = sample.world_from_body.rotation;
-            estimated.push(stamp, Isometry3::from_parts(sample.estimated_position.into(), rotation))?;
+            flown.push(stamp, *world_from_body)?;
+            estimated.push(stamp, Isometry3::from_parts((*estimated_position).into(), world_from_body.rotation))?;
         }
         start += f.plan.trajectory.duration();
     }

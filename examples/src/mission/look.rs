@@ -33,7 +33,7 @@ pub(super) fn look(
     let paint = &task.paint.paint;
     let before =
         photograph(task, camera_before(task, std::iter::empty())?, 1, flyer, &|share| stage.share(0.5 * share))?;
-    let camera = camera_before(task, flights.iter().map(|layer| &layer.flight))?;
+    let camera = camera_before(task, flights.iter().flat_map(|layer| layer.shots.iter().map(|(_, shot)| *shot)))?;
     let after = photograph(task, camera, 2, flyer, &|share| stage.share(0.5 + 0.5 * share))?;
     // The camera's exposure is set by a white patch, so that its light is the reflectance.
     let light: Vec<f64> = before.light().iter().flatten().map(|texel| texel.log.exp()).collect();

@@ -15,13 +15,14 @@ use super::inspect::inspect;
 use super::painted_mesh::save_painted_mesh;
 use super::painted_views::save_painted_views;
 use super::painting_task::PaintingTask;
-use super::path_view::save_path;
+use super::path_view::{FlownWay, save_path};
 use super::progress_views::save_progress;
-use super::run::Mission;
+use super::run::{Mission, one_after_another};
 use super::sagging::save_sagging;
 use super::settings::PainterChoice;
 use super::shading::shading;
-use super::trajectory_table::trajectory_table;
+use super::team::first_of_each_cell;
+use super::trajectory_table::save_trajectories;
 use super::written_file::{unwritable, write};
 use crate::mesh_io::{PlyMesh, write_ply};
 use crate::pictures::{COLOUR_DIFFERENCE, ErrorScale, Panel, Rgb, save_curves, save_error_map};
@@ -50,7 +51,7 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     if mission.task.of_picture {
         // Its surface and its flight are shown with those of the other paints.
         save_angles(&[mission], folder)?;
-        write(&folder.join("trajectory.csv"), &trajectory_table(&[mission]))?;
+        save_trajectories(&[mission], folder)?;
         stage.done(&folder.display().to_string());
     } else {
         let colours = save_painted_mesh(&mission.task, &page_colours(&mission.task, &mission.painted_depth()), folder)?;
@@ -111,25 +112,28 @@ pub(super) fn texture(task: &PaintingTask, depth: &Image) -> Rgb {
     Rgb::of_page(depth.width(), depth.height(), page_colours(task, depth))
 }
 
-/// The way of the first flight before the surface: of several layers the base coat alone, as all of them hide the surface and one another.
+/// The ways of the first flights before the surface, one of each robot's cells: of several layers the base coat alone, as all of them hide the surface
+/// and one another.
 pub(super) fn save_flown_path(
     mission: &Mission,
     shade: &(dyn Fn(&Hit) -> Shading + Sync),
     folder: &Path,
 ) -> Result<(), MissionError> {
-    let Some(base) = mission.flights.first() else { return Ok(()) };
-    let path = |of: &dyn Fn(&FlightSample) -> Point3<f64>| -> Vec<Point3<f64>> {
-        base.flight.samples.iter().step_by(10).map(of).collect()
-    };
-    let vehicle = path(&|s| s.world_from_body.translation.vector.into());
-    let nozzle = path(&|s| s.nozzle);
-    save_path(&mission.task, shade, nozzle, vehicle, &folder.join("path.png"))
+    let ways = first_of_each_cell(mission.flights.iter().map(|flight| (flight.turn, flight))).map(|flight| {
+        let path = |of: &dyn Fn(&FlightSample) -> Point3<f64>| flight.flight.every(RECORDING_STEP).map(of).collect();
+        FlownWay {
+            robot: flight.turn.robot,
+            nozzle: path(&|s| s.nozzle),
+            vehicle: path(&|s| s.world_from_body.translation.vector.into()),
+        }
+    });
+    save_path(&mission.task, shade, ways.collect(), &folder.join("path.png"))
 }
 
-/// The flights of some missions, one after the other: `angles.png`, `trajectory.csv`, `mission.mcap`; with the colours of the vertices in the end.
+/// The flights of some missions, one after the other: `angles.png` of the first robot, `trajectory.csv`, `mission.mcap`; with the colours of the vertices in the end.
 pub(super) fn save_flights(missions: &[&Mission], colours: &[[u8; 3]], folder: &Path) -> Result<(), MissionError> {
     save_angles(missions, folder)?;
-    write(&folder.join("trajectory.csv"), &trajectory_table(missions))?;
+    save_trajectories(missions, folder)?;
     if let Some(mission) = missions.first() {
         write(&folder.join("robot.urdf"), &mission.task.urdf())?;
     }
@@ -138,11 +142,10 @@ pub(super) fn save_flights(missions: &[&Mission], colours: &[[u8; 3]], folder: &
 
 fn save_angles(missions: &[&Mission], folder: &Path) -> Result<(), MissionError> {
     let mut curves: [Vec<(f64, f64)>; 6] = std::array::from_fn(|_| Vec::new());
-    let flights = || missions.iter().flat_map(|mission| &mission.flights);
-    let total: usize = flights().map(|f| f.flight.samples.len()).sum();
+    let flights = || one_after_another(missions).filter(|(_, f)| f.turn.robot == 0);
+    let total: usize = flights().map(|(_, f)| f.flight.samples.len()).sum();
     let stride = (total / CURVE_POINTS).max(1);
-    let mut start = 0.0;
-    for f in flights() {
+    for (start, f) in flights() {
         for s in f.flight.samples.iter().step_by(stride) {
             let minutes = (start + s.time) / 60.0;
             let open = |v: f64| if s.flow > 0.0 { v } else { f64::NAN };
@@ -156,7 +159,6 @@ fn save_angles(missions: &[&Mission], folder: &Path) -> Result<(), MissionError>
             let minutes = (start + f.plan.target_time[k]) / 60.0;
             curves[5].push((minutes, 100.0 * t.normal_deviation(&f.plan.nozzle[k].position)));
         }
-        start += f.plan.trajectory.duration();
     }
     let [wanted_pan, pan, wanted_tilt, tilt, distance, deviation] = curves;
     let panels = [
@@ -172,17 +174,17 @@ fn save_angles(missions: &[&Mission], folder: &Path) -> Result<(), MissionError>
 fn save_mcap(missions: &[&Mission], colours: &[[u8; 3]], folder: &Path) -> Result<(), MissionError> {
     let Some(task) = missions.first().map(|mission| &mission.task) else { return Ok(()) };
     let (mut states, mut log_lines, mut paints) = (Vec::new(), Vec::new(), Vec::new());
-    let mut start = 0.0;
+    let mut begun = 0.0;
     for mission in missions {
-        paints.push((start, mission.task.paint_style()));
+        paints.push((begun, mission.task.paint_style()));
         if missions.len() > 1 {
-            log_lines.push((start, format!("paint: {}", mission.task.paint.name)));
+            log_lines.push((begun, format!("paint: {}", mission.task.paint.name)));
         }
         for (k, f) in mission.flights.iter().enumerate() {
-            let strokes = f.route.strokes;
+            let (start, strokes) = (begun + f.start, f.route.strokes);
             log_lines.push((start, format!("layer {} of {}: {strokes} strokes", k + 1, mission.flights.len())));
-            let stride = (RECORDING_STEP / f.flight.interval).round().max(1.0) as usize;
-            states.extend(f.flight.samples.iter().step_by(stride).map(|s| RobotState {
+            states.extend(f.flight.every(RECORDING_STEP).map(|s| RobotState {
+                robot: f.turn.robot,
                 time: start + s.time,
                 world_from_body: s.world_from_body,
                 arm: mission.arm(s),
@@ -190,8 +192,8 @@ fn save_mcap(missions: &[&Mission], colours: &[[u8; 3]], folder: &Path) -> Resul
                 hit: s.hit,
                 flow: s.flow,
             }));
-            start += f.plan.trajectory.duration();
         }
+        begun += mission.flight_time();
     }
     let mesh = ColouredMesh {
         positions: &task.surface.vertices(),
@@ -200,6 +202,6 @@ fn save_mcap(missions: &[&Mission], colours: &[[u8; 3]], folder: &Path) -> Resul
         bare: task.appearance.srgb(0.0),
     };
     let origin = task.origin(folder);
-    save_recording(&folder.join("mission.mcap"), &mesh, &paints, &states, &log_lines, &origin)?;
+    save_recording(&folder.join("mission.mcap"), &mesh, &paints, &mut states, &mut log_lines, &origin)?;
     Ok(())
 }

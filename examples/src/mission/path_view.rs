@@ -12,25 +12,39 @@ use super::painting_task::PaintingTask;
 use super::view::{camera, picture_of, view};
 use crate::pictures::{Polyline, Scene, save_scene};
 
+/// Colour of the nozzles' ways.
+const NOZZLE: [u8; 3] = [0, 90, 200];
+/// Those of the vehicles', robot after robot.
+const VEHICLES: [[u8; 3]; 4] = [[230, 110, 20], [20, 150, 90], [150, 60, 170], [190, 30, 60]];
 /// Colour of keep-out volumes and anchors.
 const OUTLINE: [u8; 3] = [235, 150, 0];
 
-/// Draws the nozzle's way (blue) and the vehicle's (orange) before the surface, of which `shade` tells what is seen.
+/// What a flight draws.
+pub(super) struct FlownWay {
+    /// Robot, from 0.
+    pub(super) robot: usize,
+    /// Of its nozzle.
+    pub(super) nozzle: Vec<Point3<f64>>,
+    /// Of its body.
+    pub(super) vehicle: Vec<Point3<f64>>,
+}
+
+/// Draws the ways of nozzles (blue) and vehicles (a colour for each robot) before the surface, of which `shade` tells what is seen.
 pub(super) fn save_path(
     task: &PaintingTask,
     shade: &(dyn Fn(&Hit) -> Shading + Sync),
-    nozzle: Vec<Point3<f64>>,
-    vehicle: Vec<Point3<f64>>,
+    ways: Vec<FlownWay>,
     file: &Path,
 ) -> Result<(), MissionError> {
     let corners = task.surface.disk().positions().iter().map(|p| Point3::from(*p));
-    let camera = camera(task, &corners.chain(vehicle.iter().copied()).collect::<Vec<_>>())?;
+    let vehicles = ways.iter().flat_map(|way| way.vehicle.iter().copied());
+    let camera = camera(task, &corners.chain(vehicles).collect::<Vec<_>>())?;
     let frame = view(task, &camera, shade)?;
-    let lines = vec![
-        Polyline { points: nozzle, colour: [0, 90, 200], radius: 0.5 },
-        Polyline { points: vehicle, colour: [230, 110, 20], radius: 0.7 },
-    ];
-    save_lines(task, &camera, &frame, lines, file)
+    let lines = ways.into_iter().flat_map(|FlownWay { robot, nozzle, vehicle }| {
+        let colour = VEHICLES[robot % VEHICLES.len()];
+        [Polyline { points: nozzle, colour: NOZZLE, radius: 0.5 }, Polyline { points: vehicle, colour, radius: 0.7 }]
+    });
+    save_lines(task, &camera, &frame, lines.collect(), file)
 }
 
 /// Draws lines and the outlines of the mission's constraints into a view of the surface.

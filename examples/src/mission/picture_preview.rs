@@ -61,8 +61,8 @@ pub fn preview_picture(tasks: &CoatTasks, folder: &Path) -> Result<Option<Pictur
     let stage = Stage::start("preview");
     let (mut times, mut kilograms) = (Vec::new(), Vec::new());
     for coat in &tasks.coats {
-        let flights = unrehearsed(&coat.task)?.flights;
-        let once: f64 = flights.iter().map(|flight| flight.plan.trajectory.duration()).sum();
+        let mission = unrehearsed(&coat.task)?;
+        let (flights, once) = (&mission.flights, mission.duration());
         let (coats, drying) = coats(&coat.task);
         let (many, again) = (coats as f64, coats as f64 - 1.0);
         times.push(PaintTime { flown: many * once, waited: again * drying, drying });

@@ -3,7 +3,8 @@
 use paint_net::Painting;
 use paint_net::path::{StrokeSettings, boustrophedon};
 use paint_planner::mission::{
-    MissionFlight, MissionPlan, MissionPlanner, NoRehearsal, Rehearsal, Route, Spray, TargetOutcomes,
+    LiftedStrokes, MissionFlight, MissionPlan, MissionPlanner, NoRehearsal, Rehearsal, Route, Spray, TargetOutcomes,
+    Turn,
 };
 use paint_planner::plan::SmoothingPlanner;
 use paint_planner::{Error, Plan, Planner, Settings, Surface, Target, Tool};
@@ -25,10 +26,32 @@ use crate::surface::PaintSurface;
 /// Shortest stretch worth another flight, in deviations of a spot: one spot is wider.
 const SHORTEST_RETRY: f64 = 2.0;
 
+/// A flight that has not been flown.
+#[derive(Clone)]
+pub struct PlannedLayer {
+    /// Its strokes on the surface.
+    pub route: Route,
+    /// The plan.
+    pub plan: Plan,
+    /// The baseline's plan on the same targets.
+    pub(super) smoothing: Plan,
+    /// Who flies it.
+    pub turn: Turn,
+    /// When it begins, s after the first of its coat.
+    pub(super) start: f64,
+}
+
+impl PlannedLayer {
+    /// When it ends, s after the first of its coat begins.
+    fn end(&self) -> f64 {
+        self.start + self.plan.trajectory.duration()
+    }
+}
+
 /// The layers as flights that have not been flown.
 pub(super) struct Planned {
-    /// Targets, plan, and the baseline's plan on the same targets.
-    pub(super) layers: Vec<(Route, Plan, Plan)>,
+    /// Those of one coat.
+    pub(super) layers: Vec<PlannedLayer>,
     /// Coats in which they are flown, each after the one before has dried; a flight carries its share of the paint.
     pub(super) coats: usize,
     /// Time the planner took, seconds on one core.
@@ -41,6 +64,13 @@ pub(super) struct Planned {
     pub(super) left_bare: usize,
     /// What becomes of the targets with paint.
     pub(super) outcomes: TargetOutcomes,
+}
+
+impl Planned {
+    /// From the first take-off of a coat to its last landing, s.
+    pub(super) fn coat_duration(&self) -> f64 {
+        self.layers.iter().map(PlannedLayer::end).fold(0.0, f64::max)
+    }
 }
 
 /// The planner that was chosen and the time it takes, seconds.
@@ -100,7 +130,7 @@ pub(super) fn draft(task: &PaintingTask) -> Result<Draft, MissionError> {
     for (k, layer) in layers.iter().enumerate() {
         stage.share(k as f64 / layers.len() as f64);
         let first = mission.flights.len();
-        planner.add_layer(layer_route(layer, surface, settings, mission.end().1)?, &mut mission)?;
+        planner.add_strokes(&layer_strokes(layer, surface, settings)?, &mut mission)?;
         if settings.painter == PainterChoice::Fill {
             let flights = &mut mission.flights[first..];
             let mut parts: Vec<(&mut [Target], &Plan)> =
@@ -148,7 +178,8 @@ pub(super) fn finish(task: &PaintingTask, mut draft: Draft) -> Result<Planned, M
         targets.for_each(|target| target.dose /= coats as f64);
         replan(task, &mut draft)?;
     }
-    let Draft { mission, seconds } = draft;
+    let Draft { mut mission, seconds } = draft;
+    mission.schedule(&task.settings.team)?;
     let PaintingTask { layers, surface, planned_robot, settings, .. } = task;
     let stage = Stage::start("compare");
     let mesh = MeshSurface(&surface.world);
@@ -163,9 +194,10 @@ pub(super) fn finish(task: &PaintingTask, mut draft: Draft) -> Result<Planned, M
     };
     for flight in mission.flights {
         let smoothing = SmoothingPlanner.plan(&flight.route.targets, &mesh, planned_robot.tool(), &settings.planner)?;
-        planned.layers.push((flight.route, flight.plan, smoothing));
+        let MissionFlight { route, plan, turn, start, .. } = flight;
+        planned.layers.push(PlannedLayer { route, plan, smoothing, turn, start });
     }
-    let metres: f64 = planned.layers.iter().map(|(_, plan, _)| plan.path_length()).sum();
+    let metres: f64 = planned.layers.iter().map(|layer| layer.plan.path_length()).sum();
     let rehearsed = match (planned.kept_off, planned.left_bare) {
         _ if settings.check_simulated().is_err() => {
             ", not rehearsed in wind: nothing simulates a pitched hover".to_owned()
@@ -177,7 +209,8 @@ pub(super) fn finish(task: &PaintingTask, mut draft: Draft) -> Result<Planned, M
         (kept, 0) => format!(", {kept} targets kept farther off after a rehearsal in wind"),
         (kept, bare) => format!(", {kept} targets kept farther off after a rehearsal in wind, {bare} left bare"),
     };
-    let again = match planned.layers.len().saturating_sub(layers.len()) {
+    let cells = layers.len() * if settings.team.robots > 1 { 2 * settings.team.robots } else { 1 };
+    let again = match planned.layers.len().saturating_sub(cells) {
         0 => String::new(),
         more => format!(", {more} of {} flights for what another gave up", planned.layers.len()),
     };
@@ -194,6 +227,7 @@ fn mission_planner<'a, R: Rehearsal>(
 ) -> MissionPlanner<'a, R> {
     let settings = paint_planner::mission::MissionSettings {
         planner: task.settings.planner.clone(),
+        team: task.settings.team,
         shortest_retry: SHORTEST_RETRY * task.settings.spot,
         ..paint_planner::mission::MissionSettings::default()
     };
@@ -208,18 +242,18 @@ pub(super) fn unrehearsed(task: &PaintingTask) -> Result<MissionPlan, MissionErr
     let planner = mission_planner(task, chosen.as_ref(), &obstacles, &NoRehearsal);
     let mut mission = MissionPlan::default();
     for layer in &task.layers {
-        planner.add_layer(layer_route(layer, &task.surface, &task.settings, mission.end().1)?, &mut mission)?;
+        planner.add_strokes(&layer_strokes(layer, &task.surface, &task.settings)?, &mut mission)?;
     }
+    mission.schedule(&task.settings.team)?;
     Ok(mission)
 }
 
-/// The strokes of a layer on the surface, in the order in which they are flown after `from`.
-pub(super) fn layer_route(
+/// The strokes of a layer on the surface.
+pub(super) fn layer_strokes(
     layer: &Painting,
     surface: &PaintSurface,
     settings: &MissionSettings,
-    from: Option<&Target>,
-) -> Result<Route, MissionError> {
+) -> Result<LiftedStrokes, MissionError> {
     let rows;
     let strokes = if layer.strokes.is_empty() {
         rows = boustrophedon(&layer.sprays, &StrokeSettings::default())?;
@@ -229,5 +263,5 @@ pub(super) fn layer_route(
     };
     let kernel = kernel(settings)?;
     let strokes: Vec<Vec<Spray>> = strokes.iter().map(|stroke| sprays(stroke, &kernel, settings)).collect();
-    Ok(Route::lifted(surface, &strokes, settings.limits.spray_spacing as f64, from, &settings.planner)?)
+    Ok(LiftedStrokes::lift(surface, &strokes, settings.limits.spray_spacing as f64))
 }

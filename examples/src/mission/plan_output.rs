@@ -15,16 +15,18 @@ use super::error::MissionError;
 use super::figures::mean;
 use super::mission_output::RECORDING_STEP;
 use super::painting_task::PaintingTask;
-use super::path_view::save_path;
+use super::path_view::{FlownWay, save_path};
+use super::plan::PlannedLayer;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
 use super::planned_robot::PlannedRobot;
 use super::preview::expected_depth;
 use super::shading::{shading, vertex_colours};
+use super::team::{first_of_each_cell, planned_team, robot_file};
 use super::trajectory_table::{TRAJECTORY_STEP, cells};
 use super::written_file::write;
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
-use crate::report::{TimeFigures, save_figures};
+use crate::report::{TeamFigures, TimeFigures, save_figures};
 
 /// The figures of a plan. Flat, SI units in the names.
 #[derive(Debug, Clone, Serialize)]
@@ -68,6 +70,9 @@ pub struct PlanFigures {
     pub unreachable_paint_share: f64,
     /// Time in the air.
     pub flight_time_s: f64,
+    /// Who flies.
+    #[serde(flatten)]
+    pub team: TeamFigures,
     /// What makes it that long.
     #[serde(flatten)]
     pub times: TimeFigures,
@@ -118,15 +123,21 @@ impl PlanFigures {
 pub fn save_plan(mission: &PlannedMission, folder: &Path) -> Result<PlanFigures, MissionError> {
     let stage = Stage::start("export");
     let task = &mission.task;
-    write(&folder.join("plan.csv"), &table(mission))?;
+    for robot in 0..task.settings.team.robots {
+        write(&folder.join(robot_file("plan.csv", robot)), &table(mission, robot))?;
+    }
     stage.share(0.2);
     let depth = expected_depth(task);
-    if let Some((_, plan)) = mission.layers().next() {
+    let ways = first_of_each_cell(mission.layers().map(|(_, layer)| (layer.turn, layer))).map(|layer| {
         let along =
-            |of: &dyn Fn(&Setpoint) -> Point3<f64>| plan.setpoints(RECORDING_STEP).map(|(_, s)| of(&s)).collect();
-        let (nozzle, vehicle) = (along(&|s| s.nozzle.position), along(&|s| s.sample.position));
-        save_path(task, &|hit: &Hit| shading(task, &depth, hit), nozzle, vehicle, &folder.join("path.png"))?;
-    }
+            |of: &dyn Fn(&Setpoint) -> Point3<f64>| layer.plan.setpoints(RECORDING_STEP).map(|(_, s)| of(&s)).collect();
+        FlownWay {
+            robot: layer.turn.robot,
+            nozzle: along(&|s| s.nozzle.position),
+            vehicle: along(&|s| s.sample.position),
+        }
+    });
+    save_path(task, &|hit: &Hit| shading(task, &depth, hit), ways.collect(), &folder.join("path.png"))?;
     stage.share(0.7);
     write(&folder.join("robot.urdf"), &task.urdf())?;
     save_mcap(mission, &vertex_colours(task, &depth), folder)?;
@@ -136,15 +147,15 @@ pub fn save_plan(mission: &PlannedMission, folder: &Path) -> Result<PlanFigures,
     Ok(figures)
 }
 
-/// One row every [`TRAJECTORY_STEP`] seconds; layers follow each other.
-fn table(mission: &PlannedMission) -> String {
+/// One row every [`TRAJECTORY_STEP`] seconds of what a robot flies; layers follow each other.
+fn table(mission: &PlannedMission, robot: usize) -> String {
     let mut text = String::from(
         "time_s,layer,x_m,y_m,z_m,heading_rad,vx_m_per_s,vy_m_per_s,vz_m_per_s,pan_rad,tilt_rad,flow_m3_per_s,\
          target_x_m,target_y_m,target_z_m,pitch_rad\n",
     );
-    let mut start = 0.0;
-    for (layer, (_, plan)) in mission.layers().enumerate() {
-        for (time, s) in plan.setpoints(TRAJECTORY_STEP) {
+    let own = mission.layers().filter(|(_, layer)| layer.turn.robot == robot);
+    for (k, (start, layer)) in own.enumerate() {
+        for (time, s) in layer.plan.setpoints(TRAJECTORY_STEP) {
             let (p, v) = (s.sample.position, s.sample.velocity);
             let PitchingJoints { pitch, pan, tilt } = mission.task.planned_robot.joints(s.pan, s.tilt);
             let row = [
@@ -153,9 +164,8 @@ fn table(mission: &PlannedMission) -> String {
             ]
             .concat();
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "{},{layer},{}", cells(&[start + time]), cells(&row));
+            let _ = writeln!(text, "{},{k},{}", cells(&[start + time]), cells(&row));
         }
-        start += plan.trajectory.duration();
     }
     text
 }
@@ -163,25 +173,25 @@ fn table(mission: &PlannedMission) -> String {
 fn save_mcap(mission: &PlannedMission, colours: &[[u8; 3]], folder: &Path) -> Result<(), MissionError> {
     let task = &mission.task;
     let positions = task.surface.vertices();
-    let (mut states, mut log, mut start) = (Vec::new(), Vec::new(), 0.0);
-    for (k, (route, plan)) in mission.layers().enumerate() {
+    let (mut states, mut log) = (Vec::new(), Vec::new());
+    for (k, (start, PlannedLayer { route, plan, turn, .. })) in mission.layers().enumerate() {
         log.push((start, format!("layer {}: {} strokes, as planned", k + 1, route.strokes)));
-        states.extend(plan.setpoints(RECORDING_STEP).map(|(time, s)| state(task, start + time, &s)));
-        start += plan.trajectory.duration();
+        states.extend(plan.setpoints(RECORDING_STEP).map(|(time, s)| state(task, turn.robot, start + time, &s)));
     }
     let faces = task.surface.disk().faces();
     let mesh = ColouredMesh { positions: &positions, faces, colours, bare: task.appearance.srgb(0.0) };
     let (file, origin) = (folder.join("plan.mcap"), task.origin(folder));
-    Ok(save_recording(&file, &mesh, &[(0.0, task.paint_style())], &states, &log, &origin)?)
+    Ok(save_recording(&file, &mesh, &[(0.0, task.paint_style())], &mut states, &mut log, &origin)?)
 }
 
 /// The robot as the plan has it: without roll, with the joints of the reference.
-fn state(task: &PaintingTask, time: f64, s: &Setpoint) -> RobotState {
+fn state(task: &PaintingTask, robot: usize, time: f64, s: &Setpoint) -> RobotState {
     let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), s.sample.heading);
     let level = Isometry3::from_parts(Translation3::from(s.sample.position), heading);
     let joints = task.planned_robot.joints(s.pan, s.tilt);
     let PitchingJoints { pan, tilt, .. } = joints;
     RobotState {
+        robot,
         time,
         world_from_body: PlannedRobot::body(&level, &joints),
         arm: task.robot.chain.link_poses(Joints { pan, tilt }),
@@ -194,12 +204,12 @@ fn state(task: &PaintingTask, time: f64, s: &Setpoint) -> RobotState {
 fn figures(mission: &PlannedMission) -> PlanFigures {
     let (task, planned) = (&mission.task, &mission.planned);
     let outcomes = planned.outcomes;
-    let sum = |of: &dyn Fn(&Plan) -> f64| mission.layers().map(|(_, plan)| of(plan)).sum::<f64>();
-    let most = |of: &dyn Fn(&Plan) -> f64| mission.layers().map(|(_, plan)| of(plan)).fold(0.0, f64::max);
-    let flight_time = sum(&|plan| plan.trajectory.duration());
+    let sum = |of: &dyn Fn(&Plan) -> f64| mission.plans().map(|(_, plan)| of(plan)).sum::<f64>();
+    let most = |of: &dyn Fn(&Plan) -> f64| mission.plans().map(|(_, plan)| of(plan)).fold(0.0, f64::max);
+    let in_the_air = sum(&|plan| plan.trajectory.duration());
     let volume = sum(&|plan| (0..plan.flow.len()).map(|k| plan.volume(k)).sum());
     let deviations: Vec<f64> = mission
-        .layers()
+        .plans()
         .flat_map(|(route, plan)| {
             let served = route.targets.iter().enumerate().filter(|(k, t)| t.dose > 0.0 && plan.reachable[*k]);
             served.map(|(k, target)| target.normal_deviation(&plan.nozzle[k].position))
@@ -210,7 +220,7 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         surface: task.name.clone(),
         seed: task.settings.seed,
         layers: planned.layers.len(),
-        strokes: mission.layers().map(|(route, _)| route.strokes).sum(),
+        strokes: mission.plans().map(|(route, _)| route.strokes).sum(),
         targets: outcomes.targets,
         targets_not_served: outcomes.not_served(),
         targets_out_of_reach: outcomes.out_of_reach,
@@ -223,11 +233,12 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         targets_kept_off: planned.kept_off,
         targets_left_bare: planned.left_bare,
         lost_to_constraints_share: task.share_lost_to_constraints(),
-        unreachable_paint_share: share_out_of_reach(task, planned.unreachable_paint, mission.layers()),
-        flight_time_s: flight_time,
-        times: TimeFigures::of(mission.layers().map(|(_, plan)| plan), &task.settings.planner.timing),
+        unreachable_paint_share: share_out_of_reach(task, planned.unreachable_paint, mission.plans()),
+        flight_time_s: mission.duration(),
+        team: planned_team(mission),
+        times: TimeFigures::of(mission.plans().map(|(_, plan)| plan), &task.settings.planner.timing),
         path_length_m: sum(&Plan::path_length),
-        valve_open_share: sum(&Plan::open_time) / flight_time,
+        valve_open_share: sum(&Plan::open_time) / in_the_air,
         paint_kg: volume * task.paint.liquid.density,
         normal_deviation_mean_m: mean(deviations.iter().copied()),
         normal_deviation_max_m: deviations.iter().fold(0.0, |most, &d| most.max(d)),
@@ -245,7 +256,7 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
 /// Greatest planned pitch, radians; `None` where the vehicle is level.
 fn max_pitch(mission: &PlannedMission) -> Option<f64> {
     let task = &mission.task;
-    let states = mission.layers().flat_map(|(_, plan)| plan.setpoints(TRAJECTORY_STEP).map(|(_, s)| (s.pan, s.tilt)));
+    let states = mission.plans().flat_map(|(_, plan)| plan.setpoints(TRAJECTORY_STEP).map(|(_, s)| (s.pan, s.tilt)));
     let pitch = |(pan, tilt)| task.planned_robot.joints(pan, tilt).pitch.abs();
     (task.settings.pitch > 0.0).then(|| states.map(pitch).fold(0.0, f64::max))
 }

@@ -12,7 +12,6 @@ use super::error::MissionError;
 use super::figures::limit_violations;
 use super::flight_conditions::counted_flight;
 use super::flight_sensors::{Poses, camera_before};
-use super::fly::{Sprayed, spray};
 use super::flyer::{Flight, Purpose};
 use super::mission_output::texture;
 use super::painted_views::save_painted_views;
@@ -20,9 +19,11 @@ use super::painting_task::PaintingTask;
 use super::planned_mission::PlannedMission;
 use super::shading::shading;
 use super::simulated_flight::reference;
+use super::spray_flights::{FlownPaint, Sprayed, spray};
 use super::wet_surface::DriedSurface;
 use crate::adapters::PlanReference;
 use crate::appearance::DENSITY;
+use crate::simulated_sensors::SHOT_STEP;
 
 /// A layer of a mission that is planned and not flown.
 #[derive(Clone, Copy)]
@@ -46,7 +47,7 @@ pub struct FlownFigures {
 impl PlannedMission {
     /// A flight of the mission, in flying order.
     pub fn flight(&self, layer: usize) -> Option<PlannedFlight<'_>> {
-        let (_, plan, _) = self.planned.layers.get(layer)?;
+        let plan = &self.planned.layers.get(layer)?.plan;
         Some(PlannedFlight { task: &self.task, plan, layer: layer as u64 })
     }
 }
@@ -75,7 +76,9 @@ impl<'a> PlannedFlight<'a> {
     /// Puts the paint of a flight onto the surface, writes `painted.png` and `painted_view.png`, and counts.
     pub fn save(&self, log: &FlightLog, folder: &Path) -> Result<FlownFigures, MissionError> {
         let task = self.task;
-        let Sprayed { surface: DriedSurface { film, pixels, .. }, .. } = spray(std::iter::once((log, false)), task)?;
+        let (shots, duration) = (log.timed_shots(SHOT_STEP), log.samples.last().map_or(0.0, |sample| sample.time));
+        let paint = FlownPaint { shots: &shots, duration, start: 0.0, on_dry: false };
+        let Sprayed { surface: DriedSurface { film, pixels, .. }, .. } = spray([paint].into_iter(), task)?;
         let depth = task.depth_of(&film, &pixels);
         texture(task, &depth).save(&folder.join("painted.png"))?;
         save_painted_views(task, &|hit: &Hit| shading(task, &depth, hit), folder)?;

@@ -5,7 +5,7 @@ use paint_planner::mission::Route;
 
 use super::error::MissionError;
 use super::painting_task::PaintingTask;
-use super::plan::{Planned, plan};
+use super::plan::{Planned, PlannedLayer, plan};
 
 /// A mission is given up when more of the wanted paint than this is out of reach.
 const MAX_UNREACHABLE_SHARE: f64 = 0.9;
@@ -26,22 +26,30 @@ impl PlannedMission {
     /// The same of a plan that was made.
     pub(super) fn checked(task: PaintingTask, planned: Planned) -> Result<Self, MissionError> {
         let mission = Self { task, planned };
-        let share = share_out_of_reach(&mission.task, mission.planned.unreachable_paint, mission.layers());
+        let share = share_out_of_reach(&mission.task, mission.planned.unreachable_paint, mission.plans());
         if share > MAX_UNREACHABLE_SHARE {
             return Err(MissionError::OutOfReach { percent: 100.0 * share });
         }
         Ok(mission)
     }
 
-    /// Time in the air, s.
+    /// Time from the first take-off to the last landing without that on the ground between coats, s.
     pub(super) fn duration(&self) -> f64 {
-        self.layers().map(|(_, plan)| plan.trajectory.duration()).sum()
+        self.planned.coats as f64 * self.planned.coat_duration()
     }
 
-    /// Route and plan of every layer of every coat, in flying order.
-    pub fn layers(&self) -> impl Iterator<Item = (&Route, &Plan)> {
-        let layers = || self.planned.layers.iter().map(|(route, plan, _)| (route, plan));
-        (0..self.planned.coats).flat_map(move |_| layers())
+    /// Every layer of every coat with its start, s, in flying order; those of several robots one robot after the other.
+    pub fn layers(&self) -> impl Iterator<Item = (f64, &PlannedLayer)> {
+        let coat = self.planned.coat_duration();
+        (0..self.planned.coats).flat_map(move |k| {
+            let begun = k as f64 * coat;
+            self.planned.layers.iter().map(move |layer| (begun + layer.start, layer))
+        })
+    }
+
+    /// Routes and plans of all flights.
+    pub(super) fn plans(&self) -> impl Iterator<Item = (&Route, &Plan)> {
+        self.layers().map(|(_, layer)| (&layer.route, &layer.plan))
     }
 }
 

@@ -99,7 +99,8 @@ impl Preview {
 }
 
 fn estimate(task: &PaintingTask) -> Result<Preview, MissionError> {
-    let flights = unrehearsed(task)?.flights;
+    let mission = unrehearsed(task)?;
+    let flights = &mission.flights;
     let strokes = flights.iter().map(|flight| flight.route.strokes).sum();
     let volume: f64 = flights.iter().map(|flight| flight.route.volume()).sum();
     let seams = deposit_error(task)?;
@@ -115,7 +116,7 @@ fn estimate(task: &PaintingTask) -> Result<Preview, MissionError> {
         lost_to_constraints_share: task.share_lost_to_constraints(),
         wanted_in_reach_share: wanted(&task.coverage_in_reach()) / wanted(&task.coverage).max(f64::MIN_POSITIVE),
         paint_kg: volume * task.paint.liquid.density,
-        flight_time_s: flights.iter().map(|flight| flight.plan.trajectory.duration()).sum(),
+        flight_time_s: mission.duration(),
         strokes,
         deposit_error_at_seams: seams.map(|s| s.near),
         deposit_error_at_seams_naive: seams.map(|s| s.naive),

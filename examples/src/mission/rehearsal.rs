@@ -15,8 +15,8 @@ use crate::surface::PaintSurface;
 const WINDS: u64 = 2;
 /// What the robot keeps from the surface in a rehearsal, metres: the wind of the flight itself is not known.
 const MARGIN: f64 = 0.015;
-/// Samples of a flight between two looks at the gap: 50 ms, 2.5 cm at full speed.
-pub(super) const GAP_STRIDE: usize = 5;
+/// Time between two looks at the gap in a flight, s: 2.5 cm at full speed.
+pub(super) const GAP_STEP: f64 = 0.05;
 /// Winds of the rehearsals are not that of the flight.
 const SALT: u64 = 0x5EED_0F4E;
 
@@ -47,9 +47,7 @@ impl Rehearsal for WindRehearsal<'_> {
                 time: sample.time,
                 missing: MARGIN - gap_at(robot, &obstacles, sample, MARGIN),
             };
-            near_misses.extend(
-                log.samples.iter().step_by(GAP_STRIDE).map(missing).filter(|near_miss| near_miss.missing > 0.0),
-            );
+            near_misses.extend(log.every(GAP_STEP).map(missing).filter(|near_miss| near_miss.missing > 0.0));
         }
         Ok(near_misses)
     }

@@ -4,17 +4,18 @@ use nalgebra::Isometry3;
 use paint_net::Image;
 use paint_planner::mission::TargetOutcomes;
 use paint_sim::Film;
-use paint_sim::flight::{FlightLog, FlightSample};
+use paint_sim::flight::FlightSample;
 use ptu_kinematics::Joints;
 
 use super::built_in_flyer::BuiltInFlyer;
 use super::error::MissionError;
-use super::fly::{Flown, LayerFlight, Sprayed, fly, spray};
+use super::fly::{Flown, LayerFlight, fly};
 use super::flyer::Flyer;
 use super::grounded::Grounded;
 use super::identify::{Identified, identify};
 use super::painting_task::PaintingTask;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
+use super::spray_flights::{Sprayed, spray};
 use super::touch_up::{TouchUpFigures, touch_up};
 use super::wet_surface::DriedSurface;
 use crate::appearance::UNIT_THICKNESS;
@@ -66,7 +67,7 @@ impl Mission {
         let (kept_off, left_bare, outcomes) = (planned.kept_off, planned.left_bare, planned.outcomes);
         let identified = identify(&mut task, &planned)?;
         let Flown { layers: mut flights, mut grounded } = fly(planned, &task, &[], flyer)?;
-        let mut sprayed = spray(logs(&flights), &task)?;
+        let mut sprayed = spray(flights.iter().map(LayerFlight::paint), &task)?;
         let mut looked = None;
         if task.settings.look && grounded.is_none() {
             match touch_up(&mut task, &flights, &sprayed.surface, flyer) {
@@ -74,7 +75,7 @@ impl Mission {
                     flights.extend(again.layers);
                     grounded = again.grounded;
                     // From the beginning, as the shots of one flight are batched.
-                    sprayed = spray(logs(&flights), &task)?;
+                    sprayed = spray(flights.iter().map(LayerFlight::paint), &task)?;
                     looked = Some(figures);
                 }
                 // How long painting again would have taken is not known.
@@ -82,6 +83,10 @@ impl Mission {
             }
         }
         let Sprayed { surface: DriedSurface { film, pixels, ran, waited, drying }, before: partly_painted } = sprayed;
+        // They are on the surface.
+        for flight in &mut flights {
+            flight.shots = Vec::new();
+        }
         Ok(Self {
             task,
             flights,
@@ -101,9 +106,14 @@ impl Mission {
         })
     }
 
-    /// The layers, in the order in which they were flown.
+    /// The layers, in the order in which they were flown; those of several robots one robot after the other.
     pub fn flights(&self) -> &[LayerFlight] {
         &self.flights
+    }
+
+    /// From the first take-off to the last landing without the time on the ground between coats, s.
+    pub(super) fn flight_time(&self) -> f64 {
+        self.flights.iter().map(LayerFlight::end).fold(0.0, f64::max)
     }
 
     /// Flights that tank, battery, or what ended one in the air have cut the plans into, if they have.
@@ -163,7 +173,12 @@ impl Mission {
     }
 }
 
-/// The flights' logs, each with whether the paint before it is dry.
-fn logs(flights: &[LayerFlight]) -> impl Iterator<Item = (&FlightLog, bool)> {
-    flights.iter().map(|layer| (&layer.flight, layer.on_dry))
+/// The flights of missions that follow each other, each with when it begins, s.
+pub(super) fn one_after_another<'a>(missions: &[&'a Mission]) -> impl Iterator<Item = (f64, &'a LayerFlight)> {
+    let mut next = 0.0;
+    missions.iter().flat_map(move |mission| {
+        let begun = next;
+        next += mission.flight_time();
+        mission.flights.iter().map(move |flight| (begun + flight.start, flight))
+    })
 }

@@ -7,7 +7,7 @@ use paint_sim::Film;
 use super::error::MissionError;
 use super::nozzle::{kernel, shot, spray_model};
 use super::painting_task::PaintingTask;
-use super::plan::layer_route;
+use super::plan::layer_strokes;
 use super::run::Mission;
 use crate::appearance::UNIT_THICKNESS;
 use crate::simulated_sensors::SHOT_STEP;
@@ -65,7 +65,7 @@ pub(super) fn deposit_error(task: &PaintingTask) -> Result<Option<DepositError>,
     let mut shots = Vec::new();
     for layer in &task.layers {
         layer.sprays.iter().for_each(|spray| kernel.stamp(spray, &mut naive));
-        let targets = layer_route(layer, surface, settings, None)?.targets;
+        let targets = layer_strokes(layer, surface, settings)?.ordered(None, &settings.planner)?.targets;
         let stand_off = settings.planner.nozzle.stand_off;
         let ways = targets.windows(2).flat_map(|pair| upright_steps(&pair[0], &pair[1], stand_off, SHOT_STEP));
         shots.extend(ways.map(|spray| shot(&spray.nozzle, spray.volume)));

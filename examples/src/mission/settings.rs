@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_3;
 use paint_net::Limits;
 use paint_net::painters::LayerPlanning;
 use paint_planner::constraints::FlightConstraints;
+use paint_planner::mission::Team;
 use paint_planner::nozzle::NozzleSettings;
 use paint_planner::onboard::Endurance;
 use ptu_kinematics::{PtuSettings, ServoSettings};
@@ -80,6 +81,9 @@ pub struct MissionSettings {
     /// How long tank and battery last; without them all comes through the tether.
     #[serde(skip_serializing_if = "Endurance::is_endless")]
     pub endurance: Endurance,
+    /// Robots that paint at the same time. Default one.
+    #[serde(skip_serializing_if = "is_usual_team")]
+    pub team: Team,
     /// Look at the painted surface and paint again what is missing.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub look: bool,
@@ -153,6 +157,10 @@ pub enum LocalisationChoice {
     Slam,
 }
 
+fn is_usual_team(team: &Team) -> bool {
+    *team == Team::default()
+}
+
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
 fn is_level(pitch: &f64) -> bool {
     *pitch == 0.0
@@ -216,6 +224,7 @@ impl Default for MissionSettings {
             identify: false,
             localisation: None,
             endurance: Endurance::default(),
+            team: Team::default(),
             look: false,
             faults: Faults::default(),
             sensor_faults: Vec::new(),
@@ -247,6 +256,10 @@ impl MissionSettings {
         if self.look && !self.constraints.is_empty() {
             return Err(MissionError::LookConstrained);
         }
+        if self.team.robots > 1 && self.constraints.tether.is_some() {
+            return Err(MissionError::TeamTethered);
+        }
+        self.team.check()?;
         self.show.check()?;
         Ok(self.constraints.check()?)
     }

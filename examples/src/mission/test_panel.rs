@@ -49,6 +49,6 @@ pub(super) fn plan(surface: &PaintSurface, robot: &Robot, settings: &MissionSett
 pub(super) fn flown(settings: &MissionSettings) -> (Plan, FlightLog) {
     let (surface, robot) = (surface(), Robot::new(Ptu::new(settings.ptu).unwrap()));
     let plan = plan(&surface, &robot, settings);
-    let [flight, _, _] = fly_three(&plan, &surface.world, &robot, settings, 0).unwrap();
+    let (flight, _) = fly_three(&plan, &surface.world, &robot, settings, 0).unwrap();
     (plan, flight)
 }

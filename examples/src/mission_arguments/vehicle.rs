@@ -1,4 +1,4 @@
-//! What the robot carries, and how well it is known.
+//! What the robot carries, how well it is known, and how many there are.
 
 use clap::Args;
 
@@ -18,6 +18,12 @@ pub(super) struct Vehicle {
     /// that it tells
     #[arg(long)]
     identify: bool,
+    /// Robots that paint at the same time, each its own part of the surface [default: 1]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(1..=64))]
+    robots: Option<u8>,
+    /// Least distance between two of them, metres [default: 2]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    apart: Option<f64>,
 }
 
 impl Vehicle {
@@ -26,5 +32,7 @@ impl Vehicle {
         endurance.tank = self.tank.map(|litres| 1e-3 * litres).or(endurance.tank);
         endurance.battery = self.battery.map(|minutes| 60.0 * minutes).or(endurance.battery);
         settings.identify |= self.identify;
+        settings.team.robots = self.robots.map_or(settings.team.robots, usize::from);
+        settings.team.apart = self.apart.unwrap_or(settings.team.apart);
     }
 }

@@ -4,6 +4,8 @@ use foxglove::messages::{Color, LinePrimitive, SceneEntity, SceneEntityDeletion,
 use foxglove::messages::{line_primitive, scene_entity_deletion};
 use nalgebra::Point3;
 
+use super::messages::point;
+
 /// Seconds of spraying in one trace at most.
 const LENGTH: f64 = 5.0;
 
@@ -91,12 +93,6 @@ impl PaintTraces {
             SceneEntityDeletion { timestamp: None, r#type: scene_entity_deletion::Type::All as i32, id: String::new() };
         SceneUpdate { deletions: vec![deletion], entities: Vec::new() }
     }
-}
-
-/// A point as a message.
-pub(crate) fn point(p: impl Into<[f64; 3]>) -> foxglove::messages::Point3 {
-    let [x, y, z] = p.into();
-    foxglove::messages::Point3 { x, y, z }
 }
 
 #[cfg(test)]

@@ -54,6 +54,7 @@ fn check(arguments: &Arguments, first_alone: bool, settings: &MissionSettings) -
     let Some(autopilot) = &arguments.autopilot else { return Ok(()) };
     for (option, given) in [
         ("--identify", settings.identify),
+        ("--robots", settings.team.robots > 1),
         ("[settings.faults] of a mission", settings.faults != Faults::default()),
         ("--planner smoothing and smoothing-locked", settings.path_planner != PlannerChoice::Optimal),
     ] {

@@ -120,11 +120,11 @@ fn a_window_in_a_picture_stays_clean() {
     mission.settings.threads = 2;
     mission.keep_clean = vec!["box:0.3,0.15,-1,0.5,0.35,1".parse().unwrap()];
     let found = fly(&mission, &s.0.join("out"));
-    assert!((found.kept_clean_m2.unwrap() - 0.04).abs() < 0.006, "{found:?}");
+    assert!((found.clean.kept_clean_m2.unwrap() - 0.04).abs() < 0.006, "{found:?}");
     // A spot has a deviation of 2.5 cm: a stroke that ended at the frame would soil a margin as wide, half of the window.
-    assert!(found.kept_clean_soiled_share.unwrap() < 0.3, "{found:?}");
+    assert!(found.clean.kept_clean_soiled_share.unwrap() < 0.3, "{found:?}");
     let painted: f64 = found.paint_deposited_kg / 1200.0 / 0.36;
-    assert!(found.kept_clean_thickness_mean_m.unwrap() < 0.1 * painted, "{found:?}, {painted} elsewhere");
+    assert!(found.clean.kept_clean_thickness_mean_m.unwrap() < 0.1 * painted, "{found:?}, {painted} elsewhere");
     // Around the window a seventh of the picture is within two deviations of it, and pales towards it.
     let picture = found.picture.unwrap();
     assert!(picture.ciede2000_in_gamut_mean < 4.0, "{picture:?}");

@@ -134,9 +134,9 @@ fn flights_without_waste() {
         let promised = preview(&task().unwrap(), &s.0).unwrap();
         let mission = PlannedMission::new(task().unwrap()).unwrap();
         let figures = save_plan(&mission, &s.0).unwrap();
-        let times = TimeFigures::of(mission.layers().map(|(_, plan)| plan), &limits.timing);
+        let times = TimeFigures::of(mission.layers().map(|(_, layer)| &layer.plan), &limits.timing);
         let (volumes, distances): (Vec<f64>, Vec<f64>) =
-            mission.layers().map(|(_, plan)| astray(plan, &surface, &robot, limits.valve_tolerance)).unzip();
+            mission.layers().map(|(_, layer)| astray(&layer.plan, &surface, &robot, limits.valve_tolerance)).unzip();
         let volume: f64 = volumes.iter().sum();
         let nearest = distances.into_iter().fold(f64::INFINITY, f64::min);
         let flown = figures.flight_time_s;

@@ -1,7 +1,10 @@
 //! The flights of a mission and what they leave bare.
 
+use super::schedule::schedule;
 use super::strokes::Route;
 use super::target_outcomes::TargetOutcomes;
+use super::team::{Team, Turn};
+use crate::error::Error;
 use crate::plan::Plan;
 use crate::settings::Settings;
 use crate::target::Target;
@@ -18,6 +21,10 @@ pub struct MissionFlight {
     pub clearance: Vec<Option<f64>>,
     /// What it was planned with.
     pub settings: Settings,
+    /// Who flies it.
+    pub turn: Turn,
+    /// When it begins, s after the first of the mission; known once that is [scheduled](MissionPlan::schedule).
+    pub start: f64,
 }
 
 impl MissionFlight {
@@ -35,7 +42,7 @@ impl MissionFlight {
 /// All flights of a mission.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MissionPlan {
-    /// In flying order.
+    /// In flying order; those of several robots one robot after the other.
     pub flights: Vec<MissionFlight>,
     /// Paint of strokes that no flight was planned for, m³.
     pub refused_volume: f64,
@@ -51,9 +58,24 @@ impl MissionPlan {
         outcomes
     }
 
-    /// Where the last flight ends: the vehicle, and the last target.
-    pub fn end(&self) -> (Option<VehicleState>, Option<&Target>) {
-        let Some(last) = self.flights.last() else { return (None, None) };
+    /// Where the last flight of a robot ends: the vehicle, and the last target.
+    pub fn end(&self, robot: usize) -> (Option<VehicleState>, Option<&Target>) {
+        let Some(last) = self.flights.iter().rfind(|flight| flight.turn.robot == robot) else { return (None, None) };
         (last.plan.waypoints.last().map(|w| w.state), last.route.targets.last())
+    }
+
+    /// Gives every flight its start, the soonest at which no robot of the team comes nearer than [`Team::apart`] to another, planned
+    /// with some margin. One robot flies them one after another.
+    ///
+    /// # Errors
+    /// [`Error::TeamTooNear`]; [`Error::Setting`].
+    pub fn schedule(&mut self, team: &Team) -> Result<(), Error> {
+        team.check()?;
+        schedule(&mut self.flights, team)
+    }
+
+    /// From the first take-off to the last landing, s, as it is scheduled.
+    pub fn duration(&self) -> f64 {
+        self.flights.iter().map(|flight| flight.start + flight.plan.trajectory.duration()).fold(0.0, f64::max)
     }
 }

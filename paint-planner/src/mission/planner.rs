@@ -1,9 +1,11 @@
 //! From strokes on a surface to flights: plan, rehearse, and fly once more what was given up although a pose reaches it.
 
+use super::cells::Cells;
 use super::flights::{MissionFlight, MissionPlan};
 use super::rehearse::Rehearsal;
 use super::retry::take_unserved;
-use super::strokes::Route;
+use super::strokes::{LiftedStrokes, Route};
+use super::team::{Team, Turn};
 use crate::error::Error;
 use crate::not_served::NotServed;
 use crate::plan::{OptimalPlanner, Plan, Planner};
@@ -18,6 +20,8 @@ use crate::world::{Surface, Tool};
 pub struct MissionSettings {
     /// The planner's settings.
     pub planner: Settings,
+    /// Robots that fly at the same time (default one).
+    pub team: Team,
     /// Flights over the same strokes (default 3). The first gives stretches up that a pose reaches, since all of a stroke is one
     /// program; those become strokes of the next.
     pub flights: usize,
@@ -36,6 +40,7 @@ impl Default for MissionSettings {
     fn default() -> Self {
         Self {
             planner: Settings::default(),
+            team: Team::default(),
             flights: 3,
             retry_weight: 0.1,
             shortest_retry: 0.05,
@@ -59,10 +64,10 @@ pub struct MissionPlanner<'a, R: ?Sized> {
     pub settings: MissionSettings,
 }
 
-/// Plans a mission over strokes on a surface, each of at least two targets, in the order that is flown soonest.
+/// Plans a mission over strokes on a surface, each of at least two targets, in the order that is flown soonest, by one robot or a team.
 ///
 /// # Errors
-/// Of the first flight as [`Planner::plan`]; what keeps later ones from being planned is counted in the outcomes instead. Those of the
+/// As [`Cells::of_equal_work`] and [`MissionPlan::schedule`]. Of the first flight as [`Planner::plan`]; what keeps later ones from being planned is counted in the outcomes instead. Those of the
 /// rehearsal.
 pub fn plan_mission<R: Rehearsal + ?Sized>(
     strokes: &[Vec<Target>],
@@ -72,12 +77,13 @@ pub fn plan_mission<R: Rehearsal + ?Sized>(
     settings: MissionSettings,
 ) -> Result<MissionPlan, R::Error> {
     let mut mission = MissionPlan::default();
-    let route = Route::ordered(strokes, None, &settings.planner)?;
+    let team = settings.team;
     let planner = MissionPlanner { planner: &OptimalPlanner::default(), surface, tool, rehearsal, settings };
-    planner.add_layer(route, &mut mission)?;
+    planner.add_strokes(&LiftedStrokes { strokes: strokes.to_vec(), lost_volume: 0.0 }, &mut mission)?;
     if mission.flights.is_empty() {
         return Err(Error::NothingReachable { count: mission.refused.targets }.into());
     }
+    mission.schedule(&team)?;
     Ok(mission)
 }
 
@@ -99,12 +105,40 @@ impl<E: From<Error>> From<Error> for Refusal<E> {
 }
 
 impl<R: Rehearsal + ?Sized> MissionPlanner<'_, R> {
-    /// Adds the flights of a layer of paint: its route, and what is given up there once more by itself. It begins where the mission ends
-    /// so far.
+    /// Adds the flights of a layer of paint, each robot's from where its own have ended so far. A team divides the strokes into [cells](Cells)
+    /// of equal work.
     ///
     /// # Errors
     /// As [`plan_mission`]; a layer of which nothing is reachable is none, it adds to what the mission refused.
+    pub fn add_strokes(&self, lifted: &LiftedStrokes, mission: &mut MissionPlan) -> Result<(), R::Error> {
+        let (team, settings) = (&self.settings.team, &self.settings.planner);
+        team.check()?;
+        if team.robots == 1 {
+            return self.add_layer(lifted.ordered(mission.end(0).1, settings)?, mission);
+        }
+        let layer = next_layer(mission);
+        let cells = Cells::of_equal_work(&lifted.strokes, team, settings)?.divide(&lifted.strokes);
+        let mut lost_volume = lifted.lost_volume;
+        for (cell, strokes) in cells.iter().enumerate().filter(|(_, strokes)| !strokes.is_empty()) {
+            let turn = Turn { layer, robot: cell / 2, shift: cell % 2 };
+            let mut route = Route::ordered(strokes, mission.end(turn.robot).1, settings)?;
+            route.lost_volume = std::mem::take(&mut lost_volume);
+            self.add_route(route, turn, mission)?;
+        }
+        Ok(())
+    }
+
+    /// Adds the flights of a layer of paint by the first robot alone: its route, and what is given up there once more by itself. It begins where
+    /// the robot's flights end so far.
+    ///
+    /// # Errors
+    /// As [`add_strokes`](Self::add_strokes).
     pub fn add_layer(&self, route: Route, mission: &mut MissionPlan) -> Result<(), R::Error> {
+        let turn = Turn { layer: next_layer(mission), ..Turn::default() };
+        self.add_route(route, turn, mission)
+    }
+
+    fn add_route(&self, route: Route, turn: Turn, mission: &mut MissionPlan) -> Result<(), R::Error> {
         let first = mission.flights.len();
         let mut next = Some(route);
         while let Some(route) = next.take() {
@@ -115,7 +149,7 @@ impl<R: Rehearsal + ?Sized> MissionPlanner<'_, R> {
                 settings.nozzle.cb *= self.settings.retry_weight;
             }
             let clearance = vec![Some(settings.clearance); route.targets.len()];
-            if !self.add_flight(again, route, clearance, settings, mission)? {
+            if !self.add_flight(again, turn, route, clearance, settings, mission)? {
                 break;
             }
             if mission.flights.len() - first < self.settings.flights {
@@ -133,7 +167,7 @@ impl<R: Rehearsal + ?Sized> MissionPlanner<'_, R> {
     pub fn replan(&self, first: usize, mission: &mut MissionPlan) -> Result<(), R::Error> {
         for flight in mission.flights.split_off(first) {
             let again = mission.flights.len() > first;
-            self.add_flight(again, flight.route, flight.clearance, flight.settings, mission)?;
+            self.add_flight(again, flight.turn, flight.route, flight.clearance, flight.settings, mission)?;
         }
         Ok(())
     }
@@ -142,18 +176,19 @@ impl<R: Rehearsal + ?Sized> MissionPlanner<'_, R> {
     fn add_flight(
         &self,
         again: bool,
+        turn: Turn,
         route: Route,
         mut clearance: Vec<Option<f64>>,
         settings: Settings,
         mission: &mut MissionPlan,
     ) -> Result<bool, R::Error> {
-        let settings = Settings { start: mission.end().0.or(self.settings.planner.start), ..settings };
+        let settings = Settings { start: mission.end(turn.robot).0.or(self.settings.planner.start), ..settings };
         let refused = if route.targets.len() < 2 {
             NotServed::OutOfReach
         } else {
             match self.rehearsed_plan(&route.targets, &mut clearance, &settings) {
                 Ok(plan) => {
-                    mission.flights.push(MissionFlight { route, plan, clearance, settings });
+                    mission.flights.push(MissionFlight { route, plan, clearance, settings, turn, start: 0.0 });
                     return Ok(true);
                 }
                 Err(Refusal::NotServed(Error::NothingReachable { .. })) => NotServed::NoHeading,
@@ -205,4 +240,9 @@ impl<R: Rehearsal + ?Sized> MissionPlanner<'_, R> {
         }
         Route::ordered(&strokes, route.targets.last(), &self.settings.planner).map(Some)
     }
+}
+
+/// Number of a layer that follows those of a mission.
+fn next_layer(mission: &MissionPlan) -> usize {
+    mission.flights.last().map_or(0, |flight| flight.turn.layer + 1)
 }

@@ -31,6 +31,32 @@ pub struct Spray {
     pub stand_off: Option<f64>,
 }
 
+/// Strokes on a surface, in no order.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LiftedStrokes {
+    /// Targets of each; the dose of each ends with its last target.
+    pub strokes: Vec<Vec<Target>>,
+    /// Paint of sprays that found no surface under them, m³.
+    pub lost_volume: f64,
+}
+
+impl LiftedStrokes {
+    /// Lays strokes of the plane onto a surface, sprays `spacing` apart in the plane's unit.
+    pub fn lift(chart: &dyn Chart, strokes: &[Vec<Spray>], spacing: f64) -> Self {
+        let mut lost_volume = 0.0;
+        let strokes = strokes.iter().map(|stroke| lift(chart, stroke, spacing, &mut lost_volume)).collect();
+        Self { strokes, lost_volume }
+    }
+
+    /// As one route after `from`.
+    ///
+    /// # Errors
+    /// As [`Route::ordered`].
+    pub fn ordered(&self, from: Option<&Target>, settings: &Settings) -> Result<Route, Error> {
+        Ok(Route { lost_volume: self.lost_volume, ..Route::ordered(&self.strokes, from, settings)? })
+    }
+}
+
 /// Targets of strokes, joined by flights with the valve shut.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Route {
@@ -66,23 +92,6 @@ impl Route {
         });
         let targets = flown.flatten().collect();
         Ok(Self { targets, strokes: ends.len(), lost_volume: 0.0, transit_time: order.transit_time })
-    }
-
-    /// Lays strokes onto a surface, sprays `spacing` apart in the plane's unit, and [orders](Self::ordered) them.
-    ///
-    /// # Errors
-    /// As [`order_strokes`].
-    pub fn lifted(
-        chart: &dyn Chart,
-        strokes: &[Vec<Spray>],
-        spacing: f64,
-        from: Option<&Target>,
-        settings: &Settings,
-    ) -> Result<Self, Error> {
-        let mut lost_volume = 0.0;
-        let lifted: Vec<Vec<Target>> =
-            strokes.iter().map(|stroke| lift(chart, stroke, spacing, &mut lost_volume)).collect();
-        Ok(Self { lost_volume, ..Self::ordered(&lifted, from, settings)? })
     }
 
     /// Paint that the targets ask for, m³.

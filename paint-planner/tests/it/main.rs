@@ -16,6 +16,7 @@ mod paper_exact;
 mod plans;
 mod readme;
 mod stand_off;
+mod teams;
 mod teleop;
 mod teleop_states;
 mod told_of_plans;

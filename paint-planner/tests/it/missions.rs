@@ -1,7 +1,7 @@
 //! Strokes lifted onto a surface, ordered, planned, and accounted for.
 
 use paint_planner::mission::{
-    Chart, MissionSettings, NoRehearsal, Route, Spray, TargetOutcomes, plan_mission, reachable_targets,
+    Chart, LiftedStrokes, MissionSettings, NoRehearsal, Route, Spray, TargetOutcomes, plan_mission, reachable_targets,
     reachable_texels,
 };
 use paint_planner::nalgebra::{Point3, UnitVector3, Vector3};
@@ -39,7 +39,8 @@ fn row(places: impl IntoIterator<Item = f64>) -> Vec<Spray> {
 }
 
 fn lifted(chart: &Picture, strokes: &[Vec<Spray>]) -> Route {
-    Route::lifted(chart, strokes, 2.0, None, &Settings::default()).expect("strokes that can be ordered")
+    let lifted = LiftedStrokes::lift(chart, strokes, 2.0);
+    lifted.ordered(None, &Settings::default()).expect("strokes that can be ordered")
 }
 
 #[test]

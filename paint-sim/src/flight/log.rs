@@ -44,9 +44,24 @@ impl FlightLog {
         shots
     }
 
+    /// Samples `step` seconds apart, the first among them; as near to that as the interval allows.
+    pub fn every(&self, step: f64) -> impl Iterator<Item = &FlightSample> {
+        self.samples.iter().step_by(self.stride(step))
+    }
+
+    /// The log of those alone: what is kept of a long flight. Its [`shots`](Self::shots) are those of all samples; take them before.
+    #[must_use]
+    pub fn thinned(&self, step: f64) -> Self {
+        Self { samples: self.every(step).copied().collect(), interval: self.stride(step) as f64 * self.interval }
+    }
+
+    fn stride(&self, step: f64) -> usize {
+        (step / self.interval).round().max(1.0) as usize
+    }
+
     /// How well the flight followed its reference.
     pub fn statistics(&self) -> FlightStatistics {
-        FlightStatistics::of(&self.samples)
+        FlightStatistics::of(&[&self.samples])
     }
 }
 
@@ -72,5 +87,43 @@ impl<'a> ShotAccumulator<'a> {
         let axis = UnitVector3::try_new(self.axis, 1e-300).unwrap_or(first.axis);
         let shot = Shot { origin: Point3::from(self.nozzle / self.volume), axis, volume: self.volume };
         Some((first.time, shot))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+
+    #[test]
+    fn a_thinned_log_keeps_its_times() {
+        let sample = |k: u32| FlightSample {
+            time: 0.01 * f64::from(k),
+            world_from_body: Isometry3::identity(),
+            velocity: Vector3::zeros(),
+            acceleration: Vector3::zeros(),
+            attitude: [0.0; 3],
+            estimated_position: Point3::origin(),
+            reference_position: Point3::origin(),
+            pan_tilt: [0.0; 2],
+            desired_pan_tilt: [0.0; 2],
+            nozzle: Point3::origin(),
+            axis: Vector3::x_axis(),
+            aim: None,
+            hit: None,
+            distance: 0.1,
+            wanted_distance: 0.1,
+            flow: 1.0,
+            held: false,
+        };
+        let log = FlightLog { samples: (0..102).map(sample).collect(), interval: 0.01 };
+        let thin = log.thinned(0.05);
+        assert!(thin.samples.len() == 21 && (thin.interval - 0.05).abs() < 1e-15);
+        for (k, kept) in thin.samples.iter().enumerate() {
+            assert!((kept.time - 0.05 * k as f64).abs() < 1e-12, "{}", kept.time);
+        }
+        // No finer than it is, and nothing of nothing.
+        assert_eq!((log.thinned(0.001), FlightLog::default().every(0.1).count()), (log, 0));
     }
 }

@@ -40,12 +40,13 @@ pub struct FlightStatistics {
 }
 
 impl FlightStatistics {
-    /// The figures of a run of samples.
-    pub fn of(samples: &[FlightSample]) -> Self {
-        let open = || samples.iter().filter(|s| s.flow > 0.0 && s.aim.is_some());
+    /// The figures of some runs of samples together.
+    pub fn of(runs: &[&[FlightSample]]) -> Self {
+        let samples = || runs.iter().flat_map(|run| run.iter());
+        let open = || samples().filter(|s| s.flow > 0.0 && s.aim.is_some());
         let hits = || open().filter(|s| s.hit.is_some());
         let rms = |of: &dyn Fn(&FlightSample) -> f64| mean(hits().map(|s| of(s).powi(2))).sqrt();
-        let largest = |of: &dyn Fn(&FlightSample) -> f64| samples.iter().map(of).fold(0.0, f64::max);
+        let largest = |of: &dyn Fn(&FlightSample) -> f64| samples().map(of).fold(0.0, f64::max);
 
         let mut errors: Vec<f64> = hits().filter_map(|s| Some((s.hit? - s.aim?).norm())).collect();
         errors.sort_by(f64::total_cmp);
@@ -55,7 +56,7 @@ impl FlightStatistics {
         Self {
             open_samples: open().count(),
             missed_samples: open().count() - errors.len(),
-            held_samples: samples.iter().filter(|s| s.held).count(),
+            held_samples: samples().filter(|s| s.held).count(),
             hit_error_rms: mean(errors.iter().map(|e| e * e)).sqrt(),
             hit_error_p95: errors.get(rank.saturating_sub(1)).copied().unwrap_or(0.0),
             hit_error_max: errors.last().copied().unwrap_or(0.0),

@@ -38,7 +38,7 @@ fn without_disturbance_it_is_exact_and_with_slam_it_is_not() {
         FlightSettings { wind: Wind::calm(), localisation: Localisation::perfect(), ..FlightSettings::default() };
     let log = fly(&reference, &mut LaggingPanTilt::new(0.0), &wall(), &calm).unwrap();
     // The reference starts with a jump to 0.4 m/s; after it the loop must have forgotten everything.
-    let figures = FlightStatistics::of(&log.samples[500..]);
+    let figures = FlightStatistics::of(&[&log.samples[500..]]);
     assert!(figures.hit_error_rms < 5e-4 && figures.position_error_rms < 3e-3, "{figures:?}");
 
     let slam = FlightSettings { localisation: Localisation::slam_7cm(), ..outdoors(1) };

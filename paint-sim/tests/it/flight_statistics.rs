@@ -49,7 +49,7 @@ fn every_figure_is_that_of_its_own_error() {
         FlightSample { flow: 0.0, hit: e.hit.map(|hit| moved(hit, 9.0)), pan_tilt: [9.0; 2], ..e },
         FlightSample { flow: 0.0, held: true, ..e },
     ];
-    let found = FlightStatistics::of(&samples);
+    let found = FlightStatistics::of(&[&samples]);
     assert_eq!((found.open_samples, found.missed_samples, found.held_samples), (9, 1, 1));
     // Root mean squares of one error among the eight samples that hit.
     let rms = |error: f64| error / 8.0_f64.sqrt();
@@ -73,7 +73,7 @@ fn the_95th_percentile_leaves_out_one_in_twenty() {
     let off = |k: u32| FlightSample { hit: e.aim.map(|aim| aim + Vector3::z() * f64::from(k)), ..e };
     // In any order.
     let samples: Vec<FlightSample> = (1..=40).map(|k| off(1 + 17 * k % 40)).collect();
-    let found = FlightStatistics::of(&samples);
+    let found = FlightStatistics::of(&[&samples]);
     near(found.hit_error_p95, 38.0);
     near(found.hit_error_max, 40.0);
     assert_eq!(FlightStatistics::of(&[]), FlightStatistics::default());
