@@ -35,7 +35,12 @@ impl Srgb8Table {
     pub(crate) fn get() -> &'static Self {
         static TABLE: LazyLock<Srgb8Table> = LazyLock::new(|| {
             let steps = Srgb8Steps::new();
-            let least = std::array::from_fn(|code| steps.least.get(code).map_or(f32::INFINITY, |&least| least as f32));
+            // The least number of single precision that is not less.
+            let narrow = |least: f64| {
+                let rounded = least as f32;
+                if f64::from(rounded) < least { rounded.next_up() } else { rounded }
+            };
+            let least = std::array::from_fn(|code| steps.least.get(code).map_or(f32::INFINITY, |&least| narrow(least)));
             Srgb8Table { least, start: steps.start }
         });
         &TABLE
@@ -83,5 +88,23 @@ impl Srgb8Steps {
             code += 1;
         }
         code
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// On both sides of every step, to the last bit.
+    #[test]
+    fn both_precisions_give_the_same_code() {
+        let steps = Srgb8Steps::new();
+        for least in steps.least {
+            let step = least as f32;
+            for linear in [step.next_down(), step, step.next_up()] {
+                assert_eq!(Srgb8Table::get().encode(linear), encode_srgb8(f64::from(linear)).0, "{linear}");
+            }
+        }
+        assert_eq!(Srgb8Table::get().encode(f32::NAN), 0);
     }
 }

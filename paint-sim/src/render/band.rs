@@ -6,11 +6,11 @@ use super::camera::Camera;
 use super::lights::Lights;
 use super::seen::{MAX_RAY_LENGTH, Seen};
 use super::shading::Shading;
-use crate::colour::encode_srgb8;
+use crate::colour::Srgb8Table;
 use crate::surface::{Hit, Surface};
 
 /// Rays along the edge of a tile: few triangles are in so narrow a pyramid, and many rays share them.
-const TILE: u32 = 8;
+const TILE: u32 = 16;
 
 /// Some whole rows of the frame, so that threads can own what they write.
 pub(super) struct Band<'a> {
@@ -49,37 +49,48 @@ impl BandRenderer<'_> {
         let rows = band.colour.len() / band.width;
         let (mut centres, mut samples) = (Rays::default(), Rays::default());
         let mut cosines = Vec::new();
+        let table = Srgb8Table::get();
+        // Much of a picture is as bright as the pixel before it.
+        let mut last = ([0.0; 3], [0; 3]);
         for left in (0..band.width).step_by(self.tile_edge()) {
-            let right = (left + self.tile_edge()).min(band.width);
-            let pixels = || (0..rows).flat_map(|row| (left..right).map(move |column| (row, column)));
+            let columns = left..(left + self.tile_edge()).min(band.width);
             centres.directions.clear();
+            samples.directions.clear();
             cosines.clear();
-            for (row, column) in pixels() {
-                let (direction, cosine) = self.camera.ray(column as f64, (band.top + row) as f64);
-                centres.directions.push(direction);
-                cosines.push(cosine);
+            for v in band.top..band.top + rows {
+                for u in columns.clone() {
+                    let (u, v) = (u as f64, v as f64);
+                    let (direction, cosine) = self.camera.ray(u, v);
+                    centres.directions.push(direction);
+                    cosines.push(cosine);
+                    if self.supersampling > 1 {
+                        samples.directions.extend(self.grid().map(|(du, dv)| self.camera.ray(u + du, v + dv).0));
+                    }
+                }
             }
             self.cast(&mut centres);
             if self.supersampling > 1 {
-                samples.directions.clear();
-                for (row, column) in pixels() {
-                    let (u, v) = (column as f64, (band.top + row) as f64);
-                    samples.directions.extend(self.grid().map(|(du, dv)| self.camera.ray(u + du, v + dv).0));
-                }
                 self.cast(&mut samples);
             }
-            for (k, (row, column)) in pixels().enumerate() {
-                let at = row * band.width + column;
-                let (hit, direction) = (&centres.hits[k], &centres.directions[k]);
-                if let Some(hit) = hit {
-                    band.depth[at] = (hit.distance * cosines[k]) as f32;
-                    band.faces[at] = hit.face;
-                    band.normals[at] = facing(hit, direction).map(|v| v as f32).into();
+            let light = self.light(if self.supersampling == 1 { &centres } else { &samples });
+            let rays_per_pixel = light.len() / cosines.len();
+            let rays = centres.hits.iter().zip(&centres.directions).zip(&cosines);
+            let mut pixels = rays.zip(light.chunks_exact(rays_per_pixel));
+            for row in 0..rows {
+                let places = row * band.width + columns.start..row * band.width + columns.end;
+                for (at, (((hit, direction), cosine), light)) in places.zip(pixels.by_ref()) {
+                    if let Some(hit) = hit {
+                        band.depth[at] = (hit.distance * cosine) as f32;
+                        band.faces[at] = hit.face;
+                        band.normals[at] = facing(hit, direction).map(|v| v as f32).into();
+                    }
+                    let linear = mean(light);
+                    if linear != last.0 {
+                        last = (linear, linear.map(|v| table.encode(v)));
+                    }
+                    band.colour[at] = last.1;
+                    band.clipped += usize::from(linear.iter().any(|v| *v > 1.0));
                 }
-                let linear =
-                    if self.supersampling == 1 { self.light(hit.as_ref(), direction) } else { self.mean(&samples, k) };
-                band.colour[at] = linear.map(|v| encode_srgb8(f64::from(v)).0);
-                band.clipped += usize::from(linear.iter().any(|v| *v > 1.0));
             }
         }
     }
@@ -96,27 +107,39 @@ impl BandRenderer<'_> {
         (0..n * n).map(move |i| (offset(i % n), offset(i / n)))
     }
 
-    /// Mean light over the grid of a tile's pixel.
-    fn mean(&self, samples: &Rays, pixel: usize) -> [f32; 3] {
-        let count = (self.supersampling * self.supersampling) as usize;
-        let of_pixel = pixel * count..(pixel + 1) * count;
-        let mut sum = [0.0_f32; 3];
-        for (direction, hit) in samples.directions[of_pixel.clone()].iter().zip(&samples.hits[of_pixel]) {
-            let light = self.light(hit.as_ref(), direction);
-            sum = std::array::from_fn(|c| sum[c] + light[c]);
-        }
-        sum.map(|total| total / count as f32)
-    }
-
-    fn light(&self, hit: Option<&Hit>, direction: &Vector3<f64>) -> [f32; 3] {
-        let Some(hit) = hit else { return self.lights.background(direction) };
+    /// The light that each ray brings to the eye.
+    fn light(&self, rays: &Rays) -> Vec<[f32; 3]> {
         let eye = self.camera.world_from_camera.translation.vector;
-        let normal = facing(hit, direction);
-        // Off the surface by more than the rounding of the hit, or it would shade itself.
-        let point = Point3::from(eye + direction * hit.distance + normal * (1e-6 * (1.0 + hit.distance)));
-        let seen = Seen { point, normal, towards_eye: -direction, shading: (self.shade)(hit) };
-        seen.light(self.surface, self.lights)
+        let seen = |(hit, direction): (&Option<Hit>, &Vector3<f64>)| {
+            let hit = hit.as_ref()?;
+            let normal = facing(hit, direction);
+            // Off the surface by more than the rounding of the hit, or it would shade itself.
+            let point = Point3::from(eye + direction * hit.distance + normal * (1e-6 * (1.0 + hit.distance)));
+            Some(Seen { point, normal, towards_eye: -direction, shading: (self.shade)(hit) })
+        };
+        let seen: Vec<Option<Seen>> = rays.hits.iter().zip(&rays.directions).map(seen).collect();
+        let faces_sun = |seen: &&Seen| seen.faces_sun(self.lights);
+        let facing_sun: Vec<Point3<f64>> = seen.iter().flatten().filter(faces_sun).map(|seen| seen.point).collect();
+        let dark = self.surface.occluded_parallel(&facing_sun, &self.lights.towards_sun, MAX_RAY_LENGTH);
+        let mut dark = dark.into_iter();
+        let light = |(seen, direction): (&Option<Seen>, &Vector3<f64>)| match seen {
+            None => self.lights.background(direction),
+            Some(seen) => {
+                let sunny = seen.faces_sun(self.lights) && dark.next() == Some(false);
+                seen.light(self.surface, self.lights, sunny)
+            }
+        };
+        seen.iter().zip(&rays.directions).map(light).collect()
     }
+}
+
+/// Mean of the light of a pixel's rays.
+fn mean(light: &[[f32; 3]]) -> [f32; 3] {
+    if let [only] = light {
+        return *only;
+    }
+    let sum = light.iter().fold([0.0_f32; 3], |sum, light| std::array::from_fn(|c| sum[c] + light[c]));
+    sum.map(|total| total / light.len() as f32)
 }
 
 /// The normal of the hit on the side from which the ray came.

@@ -21,28 +21,33 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// Sun and lamps unless something stands before them; sky and ambient light as if nothing did.
-    pub(super) fn light(&self, surface: &dyn Surface, lights: &Lights) -> [f32; 3] {
-        let Shading { albedo, normal, coat } = &self.shading;
-        let normal = if normal.dot(&self.normal) < 0.0 { -normal } else { *normal };
-        let lit = |towards: &Vector3<f64>, distance: f64| {
-            let cosine = normal.dot(towards);
-            if cosine > 0.0 && !surface.occluded(&self.point, towards, distance) { cosine } else { 0.0 }
+    /// The shading's normal, on the side of the eye.
+    fn shading_normal(&self) -> Vector3<f64> {
+        let normal = self.shading.normal;
+        if normal.dot(&self.normal) < 0.0 { -normal } else { normal }
+    }
+
+    /// Whether the sun lights it if nothing stands before it; a sun without light does not.
+    pub(super) fn faces_sun(&self, lights: &Lights) -> bool {
+        lights.sun.iter().any(|c| *c != 0.0) && self.shading_normal().dot(&lights.towards_sun) > 0.0
+    }
+
+    /// The sun where it is `sunny`, lamps unless something stands before them, sky and ambient light as if nothing did.
+    pub(super) fn light(&self, surface: &dyn Surface, lights: &Lights, sunny: bool) -> [f32; 3] {
+        let Shading { albedo, coat, .. } = &self.shading;
+        let normal = self.shading_normal();
+        // Of one light that reaches it: the shares that paint and coat send to the eye.
+        let shares = |towards: &Vector3<f64>| match coat {
+            None => [normal.dot(towards) as f32, 0.0],
+            Some(coat) => coat.reflected(&normal, &self.towards_eye, towards).map(|share| share as f32),
         };
-        // Of one light: the shares that paint and coat send to the eye.
-        let shares = |towards: &Vector3<f64>, distance: f64| match (lit(towards, distance), coat) {
-            (0.0, _) => [0.0; 2],
-            (cosine, None) => [cosine as f32, 0.0],
-            (_, Some(coat)) => coat.reflected(&normal, &self.towards_eye, towards).map(|share| share as f32),
-        };
-        // A sun without light needs no shadow ray.
-        let sunny = lights.sun.iter().any(|c| *c != 0.0);
-        let [matt, gloss] = if sunny { shares(lights.towards_sun.as_ref(), MAX_RAY_LENGTH) } else { [0.0; 2] };
+        let [matt, gloss] = if sunny { shares(&lights.towards_sun) } else { [0.0; 2] };
         let mut on_paint: [f32; 3] = std::array::from_fn(|c| lights.sun[c] * matt);
         let mut off_coat = lights.sun.map(|sun| sun * gloss);
         for lamp in &lights.lamps {
             let Some((towards, distance, light)) = lamp.seen_from(&self.point) else { continue };
-            let [matt, gloss] = shares(&towards, distance);
+            let lit = normal.dot(&towards) > 0.0 && !surface.occluded(&self.point, &towards, distance);
+            let [matt, gloss] = if lit { shares(&towards) } else { [0.0; 2] };
             on_paint = std::array::from_fn(|c| on_paint[c] + light[c] * matt);
             off_coat = std::array::from_fn(|c| off_coat[c] + light[c] * gloss);
         }

@@ -1,13 +1,12 @@
-//! Rays that leave one point in nearly one direction: one search of the hierarchy finds the triangles that any of them may hit.
+//! Rays that leave one point in nearly one direction.
 
-use glam::DVec3;
 use nalgebra::{Point3, Vector3};
-use parry3d_f64::partitioning::{Bvh, TraversalAction};
 
-/// Of edge tests relative to the square of the distance: more than their rounding, so that no hit is lost.
-pub(super) const MARGIN: f64 = 1e-9;
+use super::hull::Hull;
+use super::projection::Projection;
 
 /// A pyramid around rays.
+#[derive(Clone, Copy)]
 pub(super) struct Beam {
     origin: Vector3<f64>,
     /// Unit vectors: its axis, and two across.
@@ -16,8 +15,6 @@ pub(super) struct Beam {
     /// Least and largest slopes along `across`.
     pub(super) low: [f64; 2],
     pub(super) high: [f64; 2],
-    /// Normals, inwards, of its four sides, and its axis: the plane through the origin that it lies before.
-    planes: [Vector3<f64>; 5],
 }
 
 impl Beam {
@@ -35,22 +32,30 @@ impl Beam {
         let (first, second) = (ends.next()?, ends.next()?);
         let row = second - first;
         let side = (row - axis * axis.dot(&row)).try_normalize(1e-12)?;
-        let up = axis.cross(&side);
         let (low, high) = ([f64::MAX; 2], [f64::MIN; 2]);
-        let mut beam = Self { origin: origin.coords, axis, across: [side, up], low, high, planes: [axis; 5] };
+        let mut beam = Self { origin: origin.coords, axis, across: [side, axis.cross(&side)], low, high };
         for direction in directions {
             let along = direction.dot(&axis);
             if along.is_nan() || along < least_cosine {
                 return None;
             }
             let slopes = beam.slopes(&direction);
-            for (k, slope) in slopes.into_iter().enumerate() {
-                (beam.low[k], beam.high[k]) = (beam.low[k].min(slope - margin), beam.high[k].max(slope + margin));
-            }
+            beam.widen(slopes, margin);
         }
-        let ([left, down], [right, top]) = (beam.low, beam.high);
-        beam.planes = [side - axis * left, axis * right - side, up - axis * down, axis * top - up, axis];
         Some(beam)
+    }
+
+    fn widen(&mut self, slopes: [f64; 2], margin: f64) {
+        for (k, slope) in slopes.into_iter().enumerate() {
+            (self.low[k], self.high[k]) = (self.low[k].min(slope - margin), self.high[k].max(slope + margin));
+        }
+    }
+
+    /// The part of it around these slopes.
+    pub(super) fn around_slopes(&self, slopes: impl Iterator<Item = [f64; 2]>, margin: f64) -> Self {
+        let mut part = Self { low: [f64::MAX; 2], high: [f64::MIN; 2], ..*self };
+        slopes.for_each(|slopes| part.widen(slopes, margin));
+        part
     }
 
     /// How far a vector reaches along the axis.
@@ -64,59 +69,16 @@ impl Beam {
         self.across.map(|across| vector.dot(&across) * inverse)
     }
 
-    /// The leaves whose boxes are not outside one of the planes; `None` if they are more than `most`.
-    pub(super) fn leaves(&self, tree: &Bvh, most: usize) -> Option<Vec<u32>> {
-        let (mut leaves, mut many) = (Vec::with_capacity(most), false);
-        let (twice, sides) = (self.origin * 2.0, self.planes.map(|plane| (plane, plane.abs())));
-        tree.traverse(|node| {
-            // Twice the way to the middle of the box, and its size.
-            let (middle, size) = (vector(node.mins() + node.maxs()) - twice, vector(node.maxs() - node.mins()));
-            let outside = sides.iter().any(|(plane, across)| plane.dot(&middle) + across.dot(&size) < 0.0);
-            if outside {
-                return TraversalAction::Prune;
-            }
-            if let Some(leaf) = node.leaf_data() {
-                leaves.push(leaf);
-                many = leaves.len() > most;
-            }
-            if many { TraversalAction::EarlyExit } else { TraversalAction::Continue }
-        });
-        (!many).then_some(leaves)
-    }
-}
-
-fn vector(v: DVec3) -> Vector3<f64> {
-    Vector3::new(v.x, v.y, v.z)
-}
-
-/// A triangle that rays from one point may hit: the edge tests as planes through that point, which all rays share.
-pub(super) struct Candidate {
-    /// Its leaf.
-    pub(super) leaf: u32,
-    edges: [Vector3<f64>; 3],
-    margin: f64,
-}
-
-impl Candidate {
-    pub(super) fn new(leaf: u32, corners: &[Vector3<f64>; 3], origin: &Point3<f64>) -> Self {
-        Self::seen(leaf, &corners.map(|corner| corner - origin.coords))
+    /// Its four sides, and the plane through the origin that it lies before.
+    pub(super) fn hull(&self) -> Hull {
+        let (Self { origin, axis, low, high, .. }, [side, up]) = (*self, self.across);
+        let planes = [side - axis * low[0], axis * high[0] - side, up - axis * low[1], axis * high[1] - up, axis];
+        Hull { origin, planes: planes.map(|plane| (plane, 0.0)) }
     }
 
-    /// From the corners as seen from the point.
-    pub(super) fn seen(leaf: u32, [a, b, c]: &[Vector3<f64>; 3]) -> Self {
-        let farthest = a.norm_squared().max(b.norm_squared()).max(c.norm_squared());
-        Self { leaf, edges: [c.cross(b), a.cross(c), b.cross(a)], margin: MARGIN * farthest }
-    }
-
-    /// Normal of the triangle, twice its area long.
-    pub(super) fn normal(&self) -> Vector3<f64> {
-        let [u, v, w] = self.edges;
-        -(u + v + w)
-    }
-
-    /// Whether the line of a ray passes through the triangle, or by its edges within rounding.
-    pub(super) fn may_be_hit(&self, direction: &Vector3<f64>) -> bool {
-        let [u, v, w] = self.edges.map(|edge| edge.dot(direction));
-        u.min(v).min(w) >= -self.margin || u.max(v).max(w) <= self.margin
+    /// The beam as a picture of so many cells a side.
+    pub(super) fn projection(&self, side: usize) -> Projection {
+        let [left, up] = self.across;
+        Projection::perspective(self.origin, [left, up, self.axis], [self.low, self.high], side)
     }
 }

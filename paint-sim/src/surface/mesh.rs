@@ -7,18 +7,11 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, TraversalAction};
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::Triangle;
 
-use super::beam::{Beam, Candidate};
-use super::ray_query::{Hit, Surface, cast_each};
-use super::shadow_beam::ShadowBeam;
-use super::sheared_ray::ShearedRay;
+use super::packet::{Found, RayPacket};
+use super::ray_query::{Hit, Surface};
+use super::shadow_packet::Blockers;
+use super::sheared_ray::{ShearedRay, SlabRay};
 use crate::error::Error;
-
-/// Rays of a picture whose angle with their mean has a smaller cosine share too little.
-const LEAST_COSINE: f64 = 0.9;
-/// With more triangles than this a search for each ray costs less than a test of each ray with each of them.
-const MOST_LEAVES: usize = 64;
-/// Of slopes: more than their rounding, so that no hit is lost.
-const SLOPE_MARGIN: f64 = 1e-9;
 
 /// A triangle soup: open, unequal, duplicate and zero-area triangles are fine (the last are never hit).
 ///
@@ -105,7 +98,18 @@ impl TriangleSurface {
         )
     }
 
-    fn hit(&self, leaf: u32, distance: f64, barycentric: [f64; 2]) -> Hit {
+    /// The first triangle on a ray.
+    fn first(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Found> {
+        let (ray, slabs) = (ShearedRay::new(origin, direction)?, SlabRay::new(origin, direction));
+        let (leaf, (distance, weights)) = self.tree.find_best(
+            max,
+            |node, best| slabs.entry_distance(node, best).unwrap_or(f64::MAX),
+            |leaf, best| ray.intersect(&self.corners[leaf as usize], best),
+        )?;
+        Some((leaf, distance, weights))
+    }
+
+    fn hit(&self, (leaf, distance, barycentric): Found) -> Hit {
         let normal = scaled_normal(&self.corners[leaf as usize]).normalize();
         Hit { distance, face: self.faces[leaf as usize], barycentric, normal }
     }
@@ -119,43 +123,21 @@ impl TriangleSurface {
 
 impl Surface for TriangleSurface {
     fn cast(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Hit> {
-        let ray = ShearedRay::new(origin, direction)?;
-        let (leaf, (distance, barycentric)) = self.tree.find_best(
-            max,
-            |node, best| ray.entry_distance(node, best).unwrap_or(f64::MAX),
-            |leaf, best| ray.intersect(&self.corners[leaf as usize], best),
-        )?;
-        Some(self.hit(leaf, distance, barycentric))
+        self.first(origin, direction, max).map(|found| self.hit(found))
     }
 
     fn cast_beam(&self, origin: &Point3<f64>, directions: &[Vector3<f64>], max: f64) -> Vec<Option<Hit>> {
-        let beam = Beam::around(origin, directions.iter().copied(), LEAST_COSINE, SLOPE_MARGIN);
-        let Some(leaves) = beam.as_ref().and_then(|beam| beam.leaves(&self.tree, MOST_LEAVES)) else {
-            // Rays that diverge, or among many small triangles, are better searched for one by one.
-            return cast_each(self, origin, directions, max);
-        };
-        let candidates: Vec<Candidate> =
-            leaves.iter().map(|leaf| Candidate::new(*leaf, &self.corners[*leaf as usize], origin)).collect();
-        let first = |direction: &Vector3<f64>| {
-            let ray = ShearedRay::new(origin, direction)?;
-            let (mut nearest, mut first) = (max, None);
-            for candidate in candidates.iter().filter(|candidate| candidate.may_be_hit(direction)) {
-                let found = ray.intersect(&self.corners[candidate.leaf as usize], nearest);
-                if let Some((distance, barycentric)) = found.filter(|(distance, _)| *distance < nearest) {
-                    nearest = distance;
-                    first = Some((candidate.leaf, barycentric));
-                }
-            }
-            first.map(|(leaf, barycentric)| self.hit(leaf, nearest, barycentric))
-        };
-        directions.iter().map(first).collect()
+        let mut packet = RayPacket { origin, directions, max, hits: vec![None; directions.len()] };
+        packet.cast(&self.tree, &self.corners, &|direction| self.first(origin, direction, max));
+        packet.hits.into_iter().map(|found| found.map(|found| self.hit(found))).collect()
     }
 
     fn occluded(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> bool {
         let Some(ray) = ShearedRay::new(origin, direction) else { return false };
+        let slabs = SlabRay::new(origin, direction);
         let mut found = false;
         self.tree.traverse(|node| {
-            if ray.entry_distance(node, max).is_none() {
+            if slabs.entry_distance(node, max).is_none() {
                 return TraversalAction::Prune;
             }
             found = node.leaf_data().is_some_and(|leaf| ray.intersect(&self.corners[leaf as usize], max).is_some());
@@ -165,13 +147,20 @@ impl Surface for TriangleSurface {
     }
 
     fn occluded_beam(&self, origin: &Point3<f64>, from: f64, rays: &[(Vector3<f64>, f64)]) -> Vec<bool> {
-        let beam = ShadowBeam::around(origin, from, rays, &self.tree, &self.corners);
-        let occluded = |(direction, length): &(Vector3<f64>, f64)| {
-            *length > 0.0
-                && !beam.as_ref().is_some_and(|beam| beam.is_free(direction, from + length))
-                && self.occluded(&(origin + direction * from), direction, *length)
-        };
-        rays.iter().map(occluded).collect()
+        let blockers = Blockers { tree: &self.tree, corners: &self.corners };
+        blockers.dark_from(origin, from, rays).unwrap_or_else(|| {
+            let occluded = |(direction, length): &(Vector3<f64>, f64)| {
+                *length > 0.0 && self.occluded(&(origin + direction * from), direction, *length)
+            };
+            rays.iter().map(occluded).collect()
+        })
+    }
+
+    fn occluded_parallel(&self, origins: &[Point3<f64>], direction: &Vector3<f64>, max: f64) -> Vec<bool> {
+        let blockers = Blockers { tree: &self.tree, corners: &self.corners };
+        blockers
+            .dark_beside(origins, direction, max)
+            .unwrap_or_else(|| origins.iter().map(|origin| self.occluded(origin, direction, max)).collect())
     }
 
     fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {

@@ -23,7 +23,7 @@ pub trait Surface: Sync {
     /// [`cast`](Self::cast) of rays that leave one point in nearly one direction, as those through neighbouring pixels do. Override it where
     /// such rays can share their search.
     fn cast_beam(&self, origin: &Point3<f64>, directions: &[Vector3<f64>], max: f64) -> Vec<Option<Hit>> {
-        cast_each(self, origin, directions, max)
+        directions.iter().map(|direction| self.cast(origin, direction, max)).collect()
     }
 
     /// Whether anything lies on the ray before `max` metres. Override it where any hit is cheaper than the first one.
@@ -41,16 +41,12 @@ pub trait Surface: Sync {
         rays.iter().map(occluded).collect()
     }
 
+    /// [`occluded`](Self::occluded) of rays in one direction, as those towards the sun are. Override it where they can share their search; the
+    /// answers must be those of each ray alone.
+    fn occluded_parallel(&self, origins: &[Point3<f64>], direction: &Vector3<f64>, max: f64) -> Vec<bool> {
+        origins.iter().map(|origin| self.occluded(origin, direction, max)).collect()
+    }
+
     /// Distance from `point` to the closest point of the surface, at most `max` (also returned when it is farther), m.
     fn distance(&self, point: &Point3<f64>, max: f64) -> f64;
-}
-
-/// One search for each ray.
-pub(super) fn cast_each<S: Surface + ?Sized>(
-    surface: &S,
-    origin: &Point3<f64>,
-    directions: &[Vector3<f64>],
-    max: f64,
-) -> Vec<Option<Hit>> {
-    directions.iter().map(|direction| surface.cast(origin, direction, max)).collect()
 }

@@ -1,8 +1,9 @@
-//! Shadow rays that share their search against one search for each.
+//! Rays that share their search against one search for each.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
+use paint_sim::render::{Coat, Lamp, Lights, Shading};
 use paint_sim::surface::Hit;
-use paint_sim::{Film, Shot, SprayModel, Surface, Texel, TriangleSurface};
+use paint_sim::{Camera, Film, Shot, SprayModel, Surface, Texel, TriangleSurface, render};
 
 /// Asks for every ray alone: what the trait does where nobody overrides it.
 struct OneByOne<'a>(&'a TriangleSurface);
@@ -143,6 +144,70 @@ fn no_femtolitre_depends_on_how_shadows_are_sought() {
     assert!(lost > 0);
 }
 
+#[test]
+fn sun_shadows_are_those_of_each_ray_alone() {
+    let mut random = Random(6);
+    let (mut dark, mut all) = (0, 0);
+    for k in 0..180 {
+        let away = Vector3::from(PLACES[k % 3]);
+        let step = [0.02, 0.01, 0.1][k / 3 % 3];
+        let (surface, texels) = scene(&mut random, step, [0, 3, 40, 400][k % 4], &away);
+        for patch in 0..8 {
+            let towards = match patch {
+                // In the plane of a triangle, where only rounding decides.
+                0 => texels[k * 31 % texels.len()].normal.cross(&random.vector(1.0)).normalize(),
+                _ => (random.vector(0.7) + Vector3::z()).normalize(),
+            };
+            let (first, lift) =
+                (random.between(0.0, 0.9) * texels.len() as f64, 10_f64.powf(random.between(-7.0, -2.0)));
+            let points: Vec<Point3<f64>> = texels[first as usize..]
+                .iter()
+                .step_by([1, 3][patch % 2])
+                .take([5, 64, 400][patch % 3])
+                .map(|texel| texel.point + texel.normal.into_inner() * lift)
+                .collect();
+            let max = [1e4, 0.1][patch % 2];
+            let alone = OneByOne(&surface).occluded_parallel(&points, &towards, max);
+            dark += alone.iter().filter(|&&dark| dark).count();
+            all += points.len();
+            assert_eq!(surface.occluded_parallel(&points, &towards, max), alone, "scene {k}, patch {patch}");
+        }
+    }
+    assert!(dark > all / 20 && dark < all / 2, "{dark} of {all}");
+}
+
+#[test]
+fn pictures_are_those_of_each_ray_alone() {
+    let mut random = Random(7);
+    let (mut seen, mut all) = (0, 0);
+    for k in 0..48 {
+        let away = Vector3::from(PLACES[k % 2]);
+        let (surface, _) = scene(&mut random, [0.02, 0.004][k / 2 % 2], [0, 3, 40, 400][k % 4], &away);
+        let eye = random.vector(0.3) + Vector3::z() * random.between(0.05, 1.0);
+        let target = random.vector(0.1);
+        let size = [(40, 30), (67, 35)][k % 2];
+        let angle = random.between(0.02, 1.8);
+        let camera = Camera::looking_at(&(eye + away).into(), &(target + away).into(), &Vector3::y(), angle, size);
+        let lamp = Lamp { position: (random.vector(0.3) + Vector3::z() + away).into(), light: [0.3, 0.2, 0.1] };
+        let lights = Lights {
+            towards_sun: UnitVector3::new_normalize(random.vector(0.8) + Vector3::z()),
+            lamps: if k % 3 == 0 { vec![lamp] } else { Vec::new() },
+            ..Lights::default()
+        };
+        let coat = (k % 5 == 0).then(|| Coat::new(0.3).unwrap());
+        let shade = |hit: &Hit| Shading { coat, ..Shading::matt([0.2, 0.5, hit.barycentric[0] as f32], hit.normal) };
+        let (camera, supersampling) = (camera.unwrap(), 1 + k as u32 % 3);
+        let expected = render(&OneByOne(&surface), &camera, &shade, &lights, supersampling, 1).unwrap();
+        seen += expected.faces.iter().filter(|face| **face != u32::MAX).count();
+        all += expected.faces.len();
+        for threads in [1, 3] {
+            let picture = render(&surface, &camera, &shade, &lights, supersampling, threads).unwrap();
+            assert!(picture == expected, "scene {k}, {threads} threads");
+        }
+    }
+    assert!(seen > all / 4 && seen < all, "{seen} of {all}");
+}
+
 /// A board beside the nozzle that reaches far behind it: in the plane x = 0.1, wider than all rays up to a depth of one metre.
 #[test]
 fn a_board_that_begins_behind_the_nozzle_casts_its_shadow() {
@@ -170,4 +235,14 @@ fn rays_without_a_length_hit_nothing() {
     let expected: Vec<bool> = (0..20).map(|k| !(3..=6).contains(&k)).collect();
     assert_eq!(surface.occluded_beam(&origin, 0.1, &rays), expected);
     assert_eq!(OneByOne(&surface).occluded_beam(&origin, 0.1, &rays), expected);
+    // Side by side: in one place, and among them one that is nowhere.
+    let mut starts = vec![origin; 20];
+    assert_eq!(surface.occluded_parallel(&starts, &-Vector3::z(), 1.0), [true; 20]);
+    starts[7].x = f64::NAN;
+    let expected: Vec<bool> = (0..20).map(|k| k != 7).collect();
+    assert_eq!(surface.occluded_parallel(&starts, &-Vector3::z(), 1.0), expected);
+    for nowhere in [Vector3::zeros(), Vector3::repeat(f64::NAN)] {
+        assert_eq!(surface.occluded_parallel(&starts, &nowhere, 1.0), [false; 20]);
+    }
+    assert!(surface.occluded_parallel(&[], &Vector3::z(), 1.0).is_empty());
 }

@@ -27,6 +27,15 @@ fn sphere(rings: u32, sectors: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     (positions, faces)
 }
 
+/// Numbers between two others, evenly.
+fn uniform(seed: u64) -> impl FnMut(f64, f64) -> f64 {
+    let mut state = seed;
+    move |low, high| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
 #[test]
 fn no_ray_leaves_a_closed_sphere() {
     let (positions, faces) = sphere(30, 60);
@@ -126,11 +135,7 @@ fn soups_are_welcome_and_nonsense_is_not() {
 /// Beams of every width before meshes coarse and fine, from outside, inside and from a corner: each ray hits what it hits alone.
 #[test]
 fn rays_of_a_beam_hit_what_each_hits_alone() {
-    let mut state = 9_u64;
-    let mut random = move |low: f64, high: f64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
+    let mut random = uniform(9);
     let mut hits = 0;
     for (rings, sectors) in [(4, 6), (24, 48), (160, 320)] {
         let (mut positions, faces) = sphere(rings, sectors);
@@ -167,4 +172,72 @@ fn rays_of_a_beam_hit_what_each_hits_alone() {
         }
     }
     assert!(hits > 20_000, "{hits}");
+}
+
+/// Many rays in any order within cones narrow and wide, so that they have to be divided: each hits what it hits alone.
+#[test]
+fn rays_of_a_cone_hit_what_each_hits_alone() {
+    let mut random = uniform(5);
+    for (rings, sectors) in [(24, 48), (200, 400)] {
+        let (mut positions, faces) = sphere(rings, sectors);
+        for p in &mut positions {
+            *p = p.map(|v| v * (1.0 + 0.2 * (9.0 * p[0] * p[1] + 5.0 * p[2]).sin()));
+        }
+        let surface = TriangleSurface::new(&positions, &faces).unwrap();
+        for k in 0..40 {
+            let origin = Point3::new(random(-2.0, 2.0), random(-2.0, 2.0), random(-2.0, 2.0));
+            let axis = (Vector3::from_fn(|_, _| random(-1.0, 1.0)) - origin.coords).normalize();
+            let width = [0.02, 0.15, 0.5, 1.5][k % 4];
+            let count = [9, 200, 1024, 3000][k / 4 % 4];
+            let direction =
+                |_| (axis + Vector3::from_fn(|_, _| width * random(-1.0, 1.0) * random(0.0, 1.0))).normalize();
+            let directions: Vec<Vector3<f64>> = (0..count).map(direction).collect();
+            let max = random(0.5, 4.0);
+            for (direction, hit) in directions.iter().zip(surface.cast_beam(&origin, &directions, max)) {
+                assert_eq!(hit, surface.cast(&origin, direction, max), "{rings} rings, from {origin} to {direction}");
+            }
+        }
+    }
+}
+
+/// Rays of a cone from inside closed meshes, every other one straight at a vertex or an edge: how many meet nothing, of how many.
+fn leaks(cones: u32) -> (usize, usize) {
+    let mut random = uniform(8);
+    let (mut leaks, mut rays) = (0, 0);
+    for rings in [30, 300] {
+        let (positions, faces) = sphere(rings, 2 * rings);
+        let surface = TriangleSurface::new(&positions, &faces).unwrap();
+        let corner = |v: u32| Vector3::from(positions[v as usize].map(f64::from));
+        for _ in 0..cones {
+            let origin = Point3::from(Vector3::from_fn(|_, _| random(-0.4, 0.4)));
+            let axis = Vector3::from_fn(|_, _| random(-1.0, 1.0)).normalize();
+            let width = random(0.02, 0.4);
+            let mut directions = Vec::with_capacity(2048);
+            while directions.len() < 2048 {
+                directions.push((axis + Vector3::from_fn(|_, _| width * random(-1.0, 1.0))).normalize());
+                let ahead =
+                    surface.cast(&origin, &directions[directions.len() - 1], 10.0).map(|hit| faces[hit.face as usize]);
+                let [a, b, _] = ahead.unwrap_or_default().map(corner);
+                let share = [0.0, 0.5, random(0.0, 1.0)][directions.len() / 2 % 3];
+                directions.push((Point3::from(a + (b - a) * share) - origin).normalize());
+            }
+            leaks += surface.cast_beam(&origin, &directions, 10.0).iter().filter(|hit| hit.is_none()).count();
+            rays += directions.len();
+        }
+    }
+    (leaks, rays)
+}
+
+#[test]
+fn no_ray_of_a_cone_leaves_a_closed_mesh() {
+    let (leaks, rays) = leaks(250);
+    assert!(leaks == 0 && rays > 1_000_000, "{leaks} of {rays}");
+}
+
+/// Minutes: `cargo test --release -p paint-sim --test it -- --ignored hundred_million`.
+#[test]
+#[ignore = "takes minutes"]
+fn no_ray_of_a_hundred_million_leaves_a_closed_mesh() {
+    let (leaks, rays) = leaks(24_500);
+    assert!(leaks == 0 && rays > 100_000_000, "{leaks} of {rays}");
 }
