@@ -4,6 +4,7 @@ pub mod calibration;
 pub mod colours;
 pub mod control;
 pub mod cpu;
+pub mod droplet_rays;
 pub mod films;
 pub mod flight;
 pub mod frames;

@@ -14,8 +14,8 @@ use paintcopter::mesh_io::read_mesh;
 use paintcopter::world::rock_wall;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
 use paintcopter_benches::{
-    Rng, calibration, colours, control, films, fuzzed_meshes, motion, painting, planner, pose_graphs, room,
-    split_meshes, vocabulary,
+    Rng, calibration, colours, control, droplet_rays, films, fuzzed_meshes, motion, painting, planner, pose_graphs,
+    room, split_meshes, vocabulary,
 };
 use serde_json::json;
 use uv_param::cut::CutSettings;
@@ -100,6 +100,17 @@ enum Job {
         /// Films, and colours
         #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
         count: u32,
+        /// Runs of which the median is printed
+        #[arg(long, default_value_t = 5)]
+        runs: usize,
+    },
+    /// Casts droplets as rays, and writes mesh and rays for `droplet_peers.py`
+    Droplets {
+        /// Folder to write into
+        folder: PathBuf,
+        /// Distance of the nozzle from the wall, metres
+        #[arg(long, default_value_t = 0.1)]
+        stand_off: f64,
         /// Runs of which the median is printed
         #[arg(long, default_value_t = 5)]
         runs: usize,
@@ -203,6 +214,7 @@ fn main() -> ExitCode {
         Job::Paint { image, size, runs, passes: None } => painting::run(&image, size.into(), runs),
         Job::Colour { image, runs } => colours::run(&image, runs),
         Job::Calibration { folder, runs } => calibration::run(&folder, runs),
+        Job::Droplets { folder, stand_off, runs } => droplets(&folder, stand_off, runs),
         Job::Sim { count, runs } => sim(count as usize, runs),
         Job::Tsdf { stream, voxel, frames, threads, no_colour, out } => {
             tsdf(&stream, voxel, frames, threads.into(), !no_colour, out.as_deref())
@@ -320,6 +332,20 @@ fn textured(chart: &Chart) -> Result<String, std::fmt::Error> {
         writeln!(text, "f {a}/{a} {b}/{b} {c}/{c}")?;
     }
     Ok(text)
+}
+
+/// Droplets as rays.
+fn droplets(folder: &Path, stand_off: f64, runs: usize) -> Result<(), AnyError> {
+    let cast = droplet_rays::run(folder, stand_off, runs)?;
+    let per_second = cast.rays as f64 / cast.cpu_ms * 1e-3;
+    println!(
+        "{}",
+        json!({
+            "fig": "droplet_rays", "peer": "paint-sim", "rays": cast.rays, "triangles": cast.triangles, "runs": runs.max(1),
+            "cpu_ms": cast.cpu_ms, "million_per_second": per_second, "misses": cast.misses,
+        })
+    );
+    Ok(())
 }
 
 fn sim(count: usize, runs: usize) -> Result<(), AnyError> {

@@ -18,14 +18,14 @@ pub(super) struct Beam {
 }
 
 impl Beam {
-    /// The pyramid around rays from a point, wider by `margin` in slope; `None` where the cosine of an angle with their mean is smaller than
-    /// `least_cosine`.
+    /// The pyramid around rays from a point, wider by `margin` in slope, and the rays' slopes; `None` where the cosine of an angle with their mean
+    /// is smaller than `least_cosine`.
     pub(super) fn around(
         origin: &Point3<f64>,
-        directions: impl Iterator<Item = Vector3<f64>> + Clone,
+        directions: impl ExactSizeIterator<Item = Vector3<f64>> + Clone,
         least_cosine: f64,
         margin: f64,
-    ) -> Option<Self> {
+    ) -> Option<(Self, Vec<[f64; 2]>)> {
         let axis = directions.clone().sum::<Vector3<f64>>().try_normalize(0.1)?;
         // Along the rows of the picture, as its pixels come in that order: a pyramid askew to them would be wider.
         let mut ends = directions.clone();
@@ -33,21 +33,27 @@ impl Beam {
         let row = second - first;
         let side = (row - axis * axis.dot(&row)).try_normalize(1e-12)?;
         let (low, high) = ([f64::MAX; 2], [f64::MIN; 2]);
+        let mut all = Vec::with_capacity(directions.len());
         let mut beam = Self { origin: origin.coords, axis, across: [side, axis.cross(&side)], low, high };
         for direction in directions {
             let along = direction.dot(&axis);
             if along.is_nan() || along < least_cosine {
                 return None;
             }
-            let slopes = beam.slopes(&direction);
+            let inverse = 1.0 / along;
+            let slopes = beam.across.map(|across| direction.dot(&across) * inverse);
             beam.widen(slopes, margin);
+            all.push(slopes);
         }
-        Some(beam)
+        Some((beam, all))
     }
 
     fn widen(&mut self, slopes: [f64; 2], margin: f64) {
         for (k, slope) in slopes.into_iter().enumerate() {
-            (self.low[k], self.high[k]) = (self.low[k].min(slope - margin), self.high[k].max(slope + margin));
+            let (below, above) = (slope - margin, slope + margin);
+            // Without the care for what is not a number.
+            self.low[k] = if below < self.low[k] { below } else { self.low[k] };
+            self.high[k] = if above > self.high[k] { above } else { self.high[k] };
         }
     }
 
@@ -61,12 +67,6 @@ impl Beam {
     /// How far a vector reaches along the axis.
     pub(super) fn depth(&self, vector: &Vector3<f64>) -> f64 {
         vector.dot(&self.axis)
-    }
-
-    /// How steeply a vector leaves the axis along the two directions across.
-    pub(super) fn slopes(&self, vector: &Vector3<f64>) -> [f64; 2] {
-        let inverse = 1.0 / self.depth(vector);
-        self.across.map(|across| vector.dot(&across) * inverse)
     }
 
     /// Its four sides, and the plane through the origin that it lies before.

@@ -16,22 +16,40 @@ pub(super) struct Hull {
 impl Hull {
     /// The leaves whose boxes are not outside one of the planes; `None` if they are more than `most`.
     pub(super) fn leaves(&self, tree: &Bvh, most: usize) -> Option<Vec<u32>> {
-        let (mut leaves, mut many) = (Vec::with_capacity(most), false);
+        let (mut leaves, mut many, mut inside) = (Vec::with_capacity(most), false, Vec::new());
         let (twice, sides) =
             (self.origin * 2.0, self.planes.map(|(normal, least)| (normal, normal.abs(), 2.0 * least)));
-        tree.traverse(|node| {
+        tree.traverse_indexed(None, |node, index| {
             // Twice the way to the middle of the box, and its size.
             let (middle, size) = (vector(node.mins() + node.maxs()) - twice, vector(node.maxs() - node.mins()));
-            let outside = sides.iter().any(|(normal, across, least)| normal.dot(&middle) + across.dot(&size) < *least);
-            if outside {
-                return TraversalAction::Prune;
+            let mut within = true;
+            for (normal, across, least) in &sides {
+                let (distance, reach) = (normal.dot(&middle) - least, across.dot(&size));
+                if distance + reach < 0.0 {
+                    return TraversalAction::Prune;
+                }
+                within &= distance >= reach;
             }
             if let Some(leaf) = node.leaf_data() {
                 leaves.push(leaf);
-                many = leaves.len() > most;
+            } else if within {
+                // No box of the subtree needs another look.
+                inside.push(index);
             }
-            if many { TraversalAction::EarlyExit } else { TraversalAction::Continue }
+            many = leaves.len() > most;
+            match (many, within) {
+                (true, _) => TraversalAction::EarlyExit,
+                (_, true) => TraversalAction::Prune,
+                _ => TraversalAction::Continue,
+            }
         });
+        for index in inside {
+            tree.traverse_indexed(Some(index), |node, _| {
+                leaves.extend(node.leaf_data());
+                many |= leaves.len() > most;
+                if many { TraversalAction::EarlyExit } else { TraversalAction::Continue }
+            });
+        }
         (!many).then_some(leaves)
     }
 }

@@ -1,5 +1,7 @@
 //! A triangle mesh with a bounding volume hierarchy: the ready implementation of [`Surface`].
 
+use std::cell::Cell;
+
 use glam::DVec3;
 use nalgebra::{Point3, Vector3};
 use parry3d_f64::bounding_volume::Aabb;
@@ -7,7 +9,7 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, TraversalAction};
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::Triangle;
 
-use super::packet::{Found, RayPacket};
+use super::packet::{Found, RayPacket, is_nearer};
 use super::ray_query::{Hit, Surface};
 use super::shadow_packet::Blockers;
 use super::sheared_ray::{ShearedRay, SlabRay};
@@ -15,7 +17,7 @@ use crate::error::Error;
 
 /// A triangle soup: open, unequal, duplicate and zero-area triangles are fine (the last are never hit).
 ///
-/// No ray slips through an edge that two triangles share.
+/// No ray slips through an edge that two triangles share. Of triangles that a ray meets at the same distance it hits the first.
 #[derive(Debug, Clone)]
 pub struct TriangleSurface {
     /// Corners of the triangles that have an area; the leaves of the tree count these.
@@ -101,12 +103,19 @@ impl TriangleSurface {
     /// The first triangle on a ray.
     fn first(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Found> {
         let (ray, slabs) = (ShearedRay::new(origin, direction)?, SlabRay::new(origin, direction));
-        let (leaf, (distance, weights)) = self.tree.find_best(
+        let first: Cell<Option<Found>> = Cell::new(None);
+        self.tree.find_best(
             max,
-            |node, best| slabs.entry_distance(node, best).unwrap_or(f64::MAX),
-            |leaf, best| ray.intersect(&self.corners[leaf as usize], best),
-        )?;
-        Some((leaf, distance, weights))
+            // A box at the distance of the hit may hold one of the same distance.
+            |node, nearest| slabs.entry_distance(node, nearest).map_or(f64::MAX, f64::next_down),
+            |leaf, nearest| {
+                let (distance, weights) = ray.intersect(&self.corners[leaf as usize], nearest)?;
+                is_nearer(leaf, distance, max, first.get().as_ref())
+                    .then(|| first.set(Some((leaf, distance, weights))))?;
+                Some(distance)
+            },
+        );
+        first.get()
     }
 
     fn hit(&self, (leaf, distance, barycentric): Found) -> Hit {

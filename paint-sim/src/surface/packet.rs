@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 use parry3d_f64::partitioning::Bvh;
 
 use super::beam::Beam;
+use super::projection::inverse_depth;
 use super::ray_grid::{GridRay, RayGrid};
 use super::sheared_ray::ShearedRay;
 
@@ -15,11 +16,17 @@ const SLOPE_MARGIN: f64 = 1e-9;
 const MOST_LEAVES: usize = 4;
 /// Fewer rays are not divided: it costs more than it saves.
 const LEAST_HALF: usize = 64;
-/// Of inverse depths: more than single precision rounds.
-const NEARER: f64 = 1.0 - 1e-6;
 
 /// Leaf, distance, and barycentric weights of the second and third corner.
 pub(super) type Found = (u32, f64, [f64; 2]);
+
+/// Whether a triangle comes before what a ray has found: of equally near ones the first, in whatever order they are found.
+pub(super) fn is_nearer(leaf: u32, distance: f64, max: f64, found: Option<&Found>) -> bool {
+    match found {
+        None => distance < max,
+        Some((other, nearest, _)) => distance < *nearest || (distance == *nearest && leaf < *other),
+    }
+}
 
 /// One of the rays, and its slopes.
 struct Place {
@@ -43,7 +50,9 @@ impl RayPacket<'_> {
         corners: &[[Vector3<f64>; 3]],
         alone: &dyn Fn(&Vector3<f64>) -> Option<Found>,
     ) {
-        let Some(beam) = Beam::around(self.origin, self.directions.iter().copied(), LEAST_COSINE, SLOPE_MARGIN) else {
+        let Some((beam, slopes)) =
+            Beam::around(self.origin, self.directions.iter().copied(), LEAST_COSINE, SLOPE_MARGIN)
+        else {
             self.hits = self.directions.iter().map(alone).collect();
             return;
         };
@@ -52,8 +61,8 @@ impl RayPacket<'_> {
         if leaves.as_ref().is_some_and(Vec::is_empty) {
             return;
         }
-        let place = |(direction, ray)| Place { slopes: beam.slopes(direction), ray };
-        let mut places: Vec<Place> = self.directions.iter().zip(0..).map(place).collect();
+        let place = |(slopes, ray)| Place { slopes, ray };
+        let mut places: Vec<Place> = slopes.into_iter().zip(0..).map(place).collect();
         let mut parts = vec![(beam, &mut places[..], leaves)];
         while let Some((beam, places, leaves)) = parts.pop() {
             if let Some(leaves) = leaves {
@@ -78,21 +87,16 @@ impl RayPacket<'_> {
         let ray = |place: &Place| GridRay::new(projection.place(place.slopes), 0.0, place.ray);
         let rays: Vec<GridRay> = places.iter().map(ray).collect();
         let mut grid = RayGrid::new(side, &rays);
-        for &leaf in leaves {
-            let corners = &corners[leaf as usize];
-            let Some(covered) = projection.cover(corners) else { continue };
-            grid.meet(&covered, |ray| {
-                let (direction, hit) = (&self.directions[ray as usize], &mut self.hits[ray as usize]);
-                let nearest = hit.map_or(self.max, |(_, distance, _)| distance);
-                let (distance, weights) = ShearedRay::new(self.origin, direction)?.intersect(corners, nearest)?;
-                // As a single ray does, the first of those that are equally near.
-                if distance >= nearest {
-                    return None;
-                }
-                *hit = Some((leaf, distance, weights));
-                Some((NEARER / (distance * beam.depth(direction))) as f32)
-            });
-        }
+        grid.meet(&projection, leaves, corners, &mut |leaf, ray| {
+            let (direction, hit) = (&self.directions[ray as usize], &mut self.hits[ray as usize]);
+            let ray = ShearedRay::new(self.origin, direction)?;
+            let (distance, weights) = ray.intersect(&corners[leaf as usize], self.max)?;
+            if !is_nearer(leaf, distance, self.max, hit.as_ref()) {
+                return None;
+            }
+            *hit = Some((leaf, distance, weights));
+            Some(inverse_depth(distance * beam.depth(direction)))
+        });
     }
 }
 

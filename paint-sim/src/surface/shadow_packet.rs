@@ -5,7 +5,7 @@ use parry3d_f64::partitioning::Bvh;
 
 use super::beam::Beam;
 use super::hull::Hull;
-use super::projection::Projection;
+use super::projection::{Projection, inverse_depth};
 use super::ray_grid::{GridRay, RayGrid};
 use super::sheared_ray::ShearedRay;
 
@@ -23,8 +23,6 @@ const LENGTH_MARGIN: [f64; 2] = [1e-9, 1e-13];
 const FEWEST_RAYS: usize = 8;
 /// With more triangles than this for each ray as well.
 const MOST_LEAVES: usize = 4;
-/// Of inverse depths: more than single precision rounds.
-const NEARER: f64 = 1.0 - 1e-6;
 /// A limit that nothing passes: of rays that are known to be dark, or have no length.
 const NEVER: f32 = f32::MAX;
 
@@ -42,19 +40,20 @@ impl Blockers<'_> {
         if rays.len() < FEWEST_RAYS || (from > 0.0 && origin.coords.amax() > FARTHEST * from) {
             return None;
         }
-        let beam = Beam::around(origin, rays.iter().map(|ray| ray.0), LEAST_COSINE, SLOPE_MARGIN)?;
+        let (beam, slopes) = Beam::around(origin, rays.iter().map(|ray| ray.0), LEAST_COSINE, SLOPE_MARGIN)?;
         if (0..2).any(|k| beam.high[k] - beam.low[k] < LEAST_WIDTH) {
             return None;
         }
         let leaves = beam.hull().leaves(self.tree, MOST_LEAVES * rays.len())?;
         let side = RayGrid::side(rays.len());
         let projection = beam.projection(side);
-        let place = |((direction, length), ray): (&(Vector3<f64>, f64), u32)| {
+        let place = |ray: usize| {
+            let (direction, length) = &rays[ray];
             let end = (from + length) * beam.depth(direction);
-            let limit = if *length > 0.0 { (NEARER / end) as f32 } else { NEVER };
-            GridRay::new(projection.place(beam.slopes(direction)), limit, ray)
+            let limit = if *length > 0.0 { inverse_depth(end) } else { NEVER };
+            GridRay::new(projection.place(slopes[ray]), limit, ray as u32)
         };
-        let grid = RayGrid::new(side, &rays.iter().zip(0..).map(place).collect::<Vec<_>>());
+        let grid = RayGrid::new(side, &(0..rays.len()).map(place).collect::<Vec<_>>());
         let ray = |ray: u32| {
             let (direction, length) = rays[ray as usize];
             (origin + direction * from, direction, length)
@@ -103,16 +102,12 @@ impl Blockers<'_> {
         ray: impl Fn(u32) -> (Point3<f64>, Vector3<f64>, f64),
     ) -> Vec<bool> {
         let mut dark = vec![false; grid.len()];
-        for &leaf in leaves {
-            let corners = &self.corners[leaf as usize];
-            let Some(covered) = projection.cover(corners) else { continue };
-            grid.meet(&covered, |index| {
-                let (start, direction, length) = ray(index);
-                ShearedRay::new(&start, &direction)?.intersect(corners, length)?;
-                dark[index as usize] = true;
-                Some(NEVER)
-            });
-        }
+        grid.meet(projection, leaves, self.corners, &mut |leaf, index| {
+            let (start, direction, length) = ray(index);
+            ShearedRay::new(&start, &direction)?.intersect(&self.corners[leaf as usize], length)?;
+            dark[index as usize] = true;
+            Some(NEVER)
+        });
         dark
     }
 }

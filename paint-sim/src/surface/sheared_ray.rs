@@ -32,11 +32,12 @@ impl ShearedRay {
 
     /// Distance and barycentric weights of the second and third corner, where the ray meets the triangle before `max`.
     pub(super) fn intersect(&self, triangle: &[Vector3<f64>; 3], max: f64) -> Option<(f64, [f64; 2])> {
-        let [a, b, c] = triangle.map(|corner| {
+        let sheared = |corner: &Vector3<f64>| {
             let p = corner - self.origin;
             let [x, y, z] = turned(self.main, p.x, p.y, p.z);
             Vector3::new(x - self.shear.x * z, y - self.shear.y * z, self.shear.z * z)
-        });
+        };
+        let [a, b, c] = [sheared(&triangle[0]), sheared(&triangle[1]), sheared(&triangle[2])];
         let u = c.x * b.y - c.y * b.x;
         let v = a.x * c.y - a.y * c.x;
         let w = b.x * a.y - b.y * a.x;

@@ -119,7 +119,11 @@ fn soups_are_welcome_and_nonsense_is_not() {
     // A triangle twice, and one without area.
     let surface = TriangleSurface::new(&positions, &[[0, 1, 1], [0, 1, 2], [0, 1, 2]]).unwrap();
     let hit = surface.cast(&Point3::new(0.2, 0.2, 1.0), &-Vector3::z(), 2.0).unwrap();
-    assert!(hit.face == 1 || hit.face == 2);
+    assert_eq!(hit.face, 1);
+    let beam = [-Vector3::z(), Vector3::new(0.01, 0.0, -1.0).normalize()];
+    for hit in surface.cast_beam(&Point3::new(0.2, 0.2, 1.0), &beam, 2.0) {
+        assert_eq!(hit.unwrap().face, 1);
+    }
     assert!(surface.cast(&Point3::new(f64::NAN, 0.2, 1.0), &-Vector3::z(), 2.0).is_none());
     assert!(surface.cast(&Point3::new(0.2, 0.2, 1.0), &Vector3::zeros(), 2.0).is_none());
 
