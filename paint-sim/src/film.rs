@@ -13,6 +13,7 @@ pub mod inspection;
 mod mass_balance;
 mod texel;
 mod texel_index;
+mod texel_share;
 pub mod wet;
 
 pub use mass_balance::MassBalance;

@@ -2,14 +2,14 @@
 
 pub mod calibration;
 mod ellipse;
-
-use std::array::from_fn;
+mod slope_forms;
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
 use crate::error::{Error, check_positive, check_range};
 pub(crate) use ellipse::SlopeEllipse;
 use ellipse::{EllipticCone, left_of};
+pub(crate) use slope_forms::SlopeForms;
 
 /// One quantum of paint in the mass balance: one femtolitre, in cubic metres.
 pub const QUANTUM: f64 = 1e-18;
@@ -171,35 +171,34 @@ impl<'a> Cone<'a> {
         }
     }
 
-    /// Paint per area and unit volume at `point`, 1/m^2.
-    pub(crate) fn density(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
-        self.densities(&point.coords.data.0[0].map(|coordinate| [coordinate]), normal)[0]
+    /// What gives the density of many points at once.
+    pub(crate) fn slope_forms(&self) -> SlopeForms {
+        let (sides, center, cut) = if let Some(cone) = &self.elliptic {
+            (cone.directions_in_deviations(), cone.center_in_deviations(), cone.cut)
+        } else {
+            let left = left_of(self.axis) / self.deviation;
+            ([left, self.axis.cross(&left)], [0.0; 2], self.slope / self.deviation)
+        };
+        let forms = [*self.axis, sides[0], sides[1]];
+        SlopeForms { forms, center, most: cut * cut, range: self.range, scale: self.scale }
     }
 
-    /// The same at several points of one plane, given by their coordinates: divisions take most of the time, and so they go side by side.
-    #[inline(always)]
-    pub(crate) fn densities<const N: usize>(&self, [x, y, z]: &[[f64; N]; 3], normal: &Vector3<f64>) -> [f64; N] {
-        let (origin, axis) = (self.origin, self.axis);
-        let (x, y, z) = (x.map(|x| x - origin.x), y.map(|y| y - origin.y), z.map(|z| z - origin.z));
-        let along = |v: &Vector3<f64>| from_fn::<f64, N, _>(|i| x[i] * v.x + y[i] * v.y + z[i] * v.z);
-        let (depth, facing) = (along(axis), along(normal).map(|away| -away));
-        let slope = |v: &[f64; N]| from_fn::<f64, N, _>(|i| v[i] / depth[i]);
-        let (x, y, z) = (slope(&x), slope(&y), slope(&z));
-        let (squares, most, factor): ([f64; N], f64, f64) = if let Some(cone) = &self.elliptic {
-            (from_fn(|i| cone.squared(&Vector3::new(x[i], y[i], z[i]))), cone.cut * cone.cut, -0.5)
-        } else {
-            let square = |[x, y, z]: [f64; 3]| x * x + y * y + z * z;
-            let sideways = |i| square([x[i] - axis.x, y[i] - axis.y, z[i] - axis.z]);
-            (from_fn(sideways), self.slope * self.slope, self.exponent)
-        };
-        let before = |i: usize| depth[i] > 0.0 && depth[i] <= self.range && facing[i] > 0.0;
-        let inside: [bool; N] = from_fn(|i| before(i) && squares[i] <= most);
-        if !inside.contains(&true) {
-            return [0.0; N];
+    /// Paint per area and unit volume at `point`, 1/m^2.
+    pub(crate) fn density(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        let ray = point - self.origin;
+        let (depth, facing) = (ray.dot(self.axis), -ray.dot(normal));
+        if !(depth > 0.0 && depth <= self.range && facing > 0.0) {
+            return 0.0;
         }
-        let gauss = squares.map(|square| (factor * square).exp());
-        let density: [f64; N] = from_fn(|i| self.scale * gauss[i] * facing[i] / (depth[i] * depth[i] * depth[i]));
-        from_fn(|i| if inside[i] { density[i] } else { 0.0 })
+        let slope = ray / depth;
+        let (square, most, factor) = match &self.elliptic {
+            Some(cone) => (cone.squared(&slope), cone.cut * cone.cut, -0.5),
+            None => ((slope - self.axis).norm_squared(), self.slope * self.slope, self.exponent),
+        };
+        if square > most {
+            return 0.0;
+        }
+        self.scale * (factor * square).exp() * facing / (depth * depth * depth)
     }
 
     /// Whether a ball may touch the cone; never false when it does.

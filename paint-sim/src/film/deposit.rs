@@ -1,33 +1,16 @@
 //! From shots to paint on texels: density, shadows, and rounding that loses nothing.
 
-use std::array::from_fn;
-
 use nalgebra::Vector3;
 
-use super::texel::{Texel, check_unit};
+use super::texel::check_unit;
 use super::texel_index::TexelIndex;
+use super::texel_share::{LANES, Points, vectorised};
 use crate::error::{Error, check_not_negative};
 use crate::spray::{Cone, QUANTUM, Shot, SprayModel};
 use crate::surface::Surface;
 
 /// Shots that are worked on between two calls of `progress`; bounds the memory of the hit lists.
 pub(super) const SHOTS_PER_BATCH: usize = 1024;
-
-/// Up to this size, in deviations of the spot, a texel is one sample.
-const SINGLE_SAMPLE_SIZE: f64 = 0.125;
-
-/// Larger texels are cut into pieces of at most this size, in deviations; each takes two by two Gauss points, which
-/// leaves a relative error of about 5e-5.
-const MAX_PIECE_SIZE: f64 = 0.5;
-
-/// Most pieces per side of one texel.
-const MAX_PIECES_PER_SIDE: f64 = 8.0;
-
-/// Radius of a ball around all samples of a texel, in its sides: half a diagonal, and a little for rounding.
-const REACH: f64 = 0.75;
-
-/// Gauss points of order two on -1/2..1/2: `+- 1/sqrt(12)`.
-const GAUSS: f64 = 0.288_675_134_594_812_9;
 
 /// Quanta that the shots emit in total.
 pub(super) fn count_quanta(shots: &[Shot]) -> Result<u64, Error> {
@@ -134,12 +117,27 @@ fn find_shares(
 ) {
     let cone = Cone::new(spray, &shot.origin, &shot.axis);
     shares.clear();
+    let (forms, texel_shares) = (cone.slope_forms(), vectorised());
+    let mut claim = |lanes: &[u32], points: Points| {
+        let Some(first) = lanes.first() else { return };
+        let texels = std::array::from_fn(|k| &texels.texels[*lanes.get(k).unwrap_or(first) as usize]);
+        let found = lanes.iter().zip(texel_shares(&cone, &forms, &texels, points));
+        shares.extend(found.filter(|(_, share)| *share > 0.0).map(|(index, share)| (*index, share)));
+    };
+    let mut waiting = [Points::Two, Points::Three, Points::Pieces].map(|points| (points, [0; LANES], 0));
     texels.tree.for_each(&cone, stack, |index| {
-        let share = texel_share(&cone, &texels.texels[index as usize]);
-        if share > 0.0 {
-            shares.push((index, share));
+        let Some(points) = Points::of(&cone, &texels.texels[index as usize]) else { return };
+        let (points, lanes, count) = &mut waiting[points as usize];
+        lanes[*count] = index;
+        *count += 1;
+        if *count == LANES {
+            claim(lanes, *points);
+            *count = 0;
         }
     });
+    for (points, lanes, count) in waiting {
+        claim(&lanes[..count], points);
+    }
     remove_shadowed(texels, shot, spray, surface, shares);
 }
 
@@ -147,56 +145,6 @@ fn find_shares(
 fn kept(shares: &[(u32, f64)], efficiency: f64) -> f64 {
     let claimed: f64 = shares.iter().map(|(_, share)| share).sum();
     if claimed > efficiency { efficiency / claimed } else { 1.0 }
-}
-
-/// Share of the shot that the texel catches if nothing stands before it.
-fn texel_share(cone: &Cone, texel: &Texel) -> f64 {
-    let side = texel.area.sqrt();
-    let deviation = (texel.point - cone.origin).dot(cone.axis) * cone.deviation;
-    if side <= SINGLE_SAMPLE_SIZE * deviation {
-        return cone.density(&texel.point, &texel.normal) * texel.area;
-    }
-    if !cone.may_intersect(&texel.point, REACH * side) {
-        return 0.0;
-    }
-    // A texel at or behind the nozzle's height has no positive deviation; part of it may still be before the nozzle.
-    let pieces = if deviation > 0.0 {
-        (side / (MAX_PIECE_SIZE * deviation)).ceil().min(MAX_PIECES_PER_SIDE)
-    } else {
-        MAX_PIECES_PER_SIDE
-    };
-    let step = side / pieces;
-    let (u, v) = tangents(&texel.normal);
-    let row = 2 * pieces as usize;
-    let mut offsets = [0.0; 2 * MAX_PIECES_PER_SIDE as usize];
-    for (i, offset) in offsets[..row].iter_mut().enumerate() {
-        *offset = gauss_point(i as u32) * step - 0.5 * side;
-    }
-    let mut sum = 0.0;
-    for a in &offsets[..row] {
-        let middle = texel.point + u * *a;
-        for pair in offsets[..row].chunks_exact(2) {
-            let points: [[f64; 2]; 3] = from_fn(|axis| from_fn(|k| middle[axis] + v[axis] * pair[k]));
-            let [first, second] = cone.densities(&points, &texel.normal);
-            sum += first;
-            sum += second;
-        }
-    }
-    0.25 * sum * step * step
-}
-
-/// The `i`-th Gauss point along a row of pieces of length one.
-fn gauss_point(i: u32) -> f64 {
-    f64::from(i / 2) + if i.is_multiple_of(2) { 0.5 - GAUSS } else { 0.5 + GAUSS }
-}
-
-/// Two unit vectors that make a right-handed frame with the normal, continuous except where the normal is -z
-/// (Duff et al. 2017).
-fn tangents(n: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let sign = 1.0_f64.copysign(n.z);
-    let a = -1.0 / (sign + n.z);
-    let b = n.x * n.y * a;
-    (Vector3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vector3::new(b, sign + n.y * n.y * a, -n.y))
 }
 
 /// Takes away the shares of texels which something stands before. Nothing is closer to the nozzle than the surface, so the rays start there.

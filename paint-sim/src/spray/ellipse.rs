@@ -78,6 +78,16 @@ struct Side {
 }
 
 impl EllipticCone {
+    /// Unit vectors of the sides over their deviations.
+    pub(super) fn directions_in_deviations(&self) -> [Vector3<f64>; 2] {
+        self.sides.each_ref().map(|side| side.direction / side.deviation)
+    }
+
+    /// Slopes of the middle along the sides, in deviations.
+    pub(super) fn center_in_deviations(&self) -> [f64; 2] {
+        self.sides.each_ref().map(|side| side.center / side.deviation)
+    }
+
     /// Square of the distance from the middle in deviations, at a slope (ray over depth).
     pub(crate) fn squared(&self, slope: &Vector3<f64>) -> f64 {
         self.sides.iter().map(|side| ((slope.dot(&side.direction) - side.center) / side.deviation).powi(2)).sum()

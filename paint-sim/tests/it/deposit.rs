@@ -112,6 +112,33 @@ fn coarse_texels_are_integrated() {
 const ERF_SQUARED: f64 = 0.7145072034719534;
 
 #[test]
+fn texels_of_all_sizes_catch_their_part_of_the_gaussian() {
+    let deviation = 0.1 * 8.0_f64.to_radians().tan();
+    // Simpson's rule of 2000 parts, in deviations.
+    let part = |low: f64, high: f64| {
+        let (step, gauss) = ((high - low) / 2000.0, |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt());
+        let inner = (1..2000).map(|k| f64::from(2 + 2 * (k % 2)) * gauss(low + step * f64::from(k))).sum::<f64>();
+        (gauss(low) + inner + gauss(high)) * step / 3.0
+    };
+    for (size, bound) in
+        [(0.2, 1e-5), (0.35, 5e-5), (0.5, 2e-4), (0.51, 2e-5), (0.8, 5e-5), (1.0, 1e-4), (1.01, 5e-5), (2.9, 1e-4)]
+    {
+        for (x, y) in [(0.0, 0.0), (1.0, -0.5), (2.0, 1.0), (-0.3, 2.5)] {
+            let texel = Texel {
+                point: Point3::new(x * deviation, y * deviation, 0.1),
+                normal: unit(0.0, 0.0, -1.0),
+                area: (size * deviation).powi(2),
+            };
+            let film = Film::new(vec![texel]).unwrap();
+            let shares = film.shares(&[shot(0.0, 0.0, 1e-9)], &uncut(), &far_plate(), 1).unwrap();
+            let expected = part(x - 0.5 * size, x + 0.5 * size) * part(y - 0.5 * size, y + 0.5 * size);
+            let error = shares[0][0].1 / expected - 1.0;
+            assert!(error.abs() < bound, "{size} deviations at {x} {y}: {error}");
+        }
+    }
+}
+
+#[test]
 fn a_texel_at_the_rim_catches_what_its_corner_catches() {
     // The spot of 3 sigmas ends 42.2 mm from the axis. On the diagonal, a square of 4 cm around a place 24 mm farther out reaches 4 mm into it.
     let across = (0.1 * 3.0 * 8.0_f64.to_radians().tan() + 0.024) / 2.0_f64.sqrt();
