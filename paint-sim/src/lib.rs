@@ -60,6 +60,7 @@
 //! | Preetham, Shirley, Smits 1999 | sunlight through the air, clear sky | [`render::sunlight`], [`render::Sky::clear`] |
 //! | CIE S 011, Moon and Spencer 1942 | covered sky | [`render::Sky::overcast`] |
 //! | Ramamoorthi and Hanrahan 2001, Eqs. (8), (10) | light of a sky on a surface | [`render::Sky::on_white`] |
+//! | Woop, Benthin, Wald 2013; Pineda 1988 | what rays hit, one by one and in packets | [`TriangleSurface`] |
 //! | Planck | light of a colour temperature | [`render::black_body`] |
 //! | Walter et al. 2007; Kelemen and Szirmay-Kalos 2001 | gloss over the paint | [`render::Coat`] |
 //! | Paper II, Section 5.2 (roll and pitch), linear drag | first-order attitude, rotor drag | [`flight::Vehicle::step`] |

@@ -82,7 +82,9 @@ mod tests {
     /// A wall of six by half a metre, painted by so many robots that keep a metre apart.
     fn planned(robots: usize) -> PlannedMission {
         let mut mesh = test_panel::mesh();
-        mesh.positions.iter_mut().for_each(|[_, y, z]| (*y, *z) = (3.0 * *y, 1.0 + 0.25 * *z));
+        for [_, y, z] in &mut mesh.positions {
+            (*y, *z) = (3.0 * *y, 1.0 + 0.25 * *z);
+        }
         let mut settings = MissionSettings { threads: 1, ..MissionSettings::default() };
         (settings.team.robots, settings.team.apart) = (robots, 1.0);
         PlannedMission::new(PaintingTask::new("wall", &Scene::whole(mesh), &Design::Gradient, settings).unwrap())

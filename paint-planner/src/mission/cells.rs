@@ -258,7 +258,7 @@ mod tests {
     fn a_stroke_along_a_border_is_not_torn() {
         let cells = Cells { along: Vector3::y_axis(), borders: vec![0.5] };
         // Two targets on one side, two on the other, and so on.
-        let point = |k: usize| Point3::new(0.0, if k / 2 % 2 == 0 { 0.49 } else { 0.52 }, 0.02 * k as f64);
+        let point = |k: usize| Point3::new(0.0, if (k / 2).is_multiple_of(2) { 0.49 } else { 0.52 }, 0.02 * k as f64);
         let target =
             |k| Target { point: point(k), normal: -Vector3::x_axis(), dose: 1e-6, time: None, stand_off: None };
         let stroke: Vec<Target> = (0..30).map(target).collect();

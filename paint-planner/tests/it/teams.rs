@@ -27,7 +27,9 @@ fn strokes() -> Vec<Vec<Target>> {
     // Rows of ten metres, one over another.
     let row = |z: f64| {
         let mut row = Wall::flat().rows(10.0, 1, 0.2);
-        row.iter_mut().for_each(|target| target.point.z += z);
+        for target in &mut row {
+            target.point.z += z;
+        }
         row
     };
     (0..6).map(|k| row(0.15 * f64::from(k))).collect()

@@ -73,9 +73,8 @@ impl BandRenderer<'_> {
                 self.cast(&mut samples);
             }
             let light = self.light(if self.supersampling == 1 { &centres } else { &samples });
-            let rays_per_pixel = light.len() / cosines.len();
             let rays = centres.hits.iter().zip(&centres.directions).zip(&cosines);
-            let mut pixels = rays.zip(light.chunks_exact(rays_per_pixel));
+            let mut pixels = rays.zip(light.chunks_exact((self.supersampling * self.supersampling) as usize));
             for row in 0..rows {
                 let places = row * band.width + columns.start..row * band.width + columns.end;
                 for (at, (((hit, direction), cosine), light)) in places.zip(pixels.by_ref()) {

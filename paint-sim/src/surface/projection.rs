@@ -41,7 +41,7 @@ pub(super) struct Projection {
     side: f64,
     /// Largest absolute value of the rays' limits.
     limits: f64,
-    /// Power of lengths in the product of three corners.
+    /// Whether the rays leave the origin; if not, they are parallel.
     perspective: bool,
 }
 
