@@ -15,6 +15,29 @@ pub(crate) fn design_places(surface: &PaintSurface, viewpoint: Option<Viewpoint>
     }
 }
 
+/// Where every vertex of a surface lies on the plane of a design without a viewpoint: metres to the right of and above its middle, and the width and
+/// height of the plane.
+pub(crate) fn vertex_places(surface: &PaintSurface) -> (Vec<[f64; 2]>, [f64; 2]) {
+    let (places, extent) = design_places(surface, None);
+    let middle = extent.map(|side| 0.5 * side);
+    if surface.disk().seam_length() <= 0.0 {
+        return (surface.chart.uv().iter().map(|[u, v]| [u - middle[0], v - middle[1]]).collect(), extent);
+    }
+    let projection = Projection::new(Viewpoint::Front, surface);
+    let project = |point: &Point3<f64>| projection.project(point).unwrap_or([0.0; 2]);
+    // The plane begins where its leftmost and its highest texel lie.
+    let known = places.iter().enumerate().find_map(|(k, place)| {
+        let on_surface = surface.texels.at(k % surface.width(), k / surface.width())?;
+        Some((project(&surface.chart.point(on_surface)), (*place)?))
+    });
+    let [left, top] = known.map_or([0.0; 2], |([right, up], [x, y])| [right - x, up + y]);
+    let place = |p: &[f64; 3]| {
+        let [right, up] = project(&Point3::from(*p));
+        [right - left - middle[0], up - top + middle[1]]
+    };
+    (surface.disk().positions().iter().map(place).collect(), extent)
+}
+
 /// Metres from the upper left corner of the chart of every texel's middle, and the chart's width and height.
 fn chart_places(surface: &PaintSurface) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
     let (width, texel) = (surface.width(), surface.texels.texel_m);
@@ -59,4 +82,57 @@ fn places_in_plane(
         *at = [at[0] - low[0], high[1] - at[1]];
     }
     (places, [0, 1].map(|c| (high[c] - low[c]).max(f64::MIN_POSITIVE)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh_io::TriangleMesh;
+
+    /// On the face of every texel the places of its corners come to the place of the texel: on a wall in one piece, and on a box with seams.
+    #[test]
+    fn vertices_lie_where_texels_do() {
+        let corner = |k: u32| {
+            [
+                f32::from(u8::from(k & 1 != 0)),
+                f32::from(u8::from(k & 2 != 0)) * 0.8,
+                1.0 + f32::from(u8::from(k & 4 != 0)) * 0.6,
+            ]
+        };
+        let quad = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]];
+        let positions: Vec<[f32; 3]> = (0..8).map(corner).collect();
+        for sides in [&sides[..], &sides[5..]] {
+            let faces = sides.iter().flat_map(|side| quad(*side)).collect();
+            let mesh = TriangleMesh { positions: positions.clone(), faces, ..TriangleMesh::default() };
+            let surface = PaintSurface::new(&mesh, 0.05, &|_| ()).unwrap();
+            let (places, extent) = design_places(&surface, None);
+            let (of_vertices, same) = vertex_places(&surface);
+            assert_eq!(extent, same);
+            assert_eq!(surface.disk().seam_length() > 0.0, sides.len() > 1);
+            let mut seen = 0;
+            for (k, place) in places.iter().enumerate() {
+                let at = surface.texels.at(k % surface.width(), k / surface.width());
+                let (Some(at), Some([x, y])) = (at, place) else { continue };
+                // A texel at the rim shows the surface beside its middle.
+                if surface.chart.locate(surface.texels.uv_of_texel(k % surface.width(), k / surface.width())).is_none()
+                {
+                    continue;
+                }
+                let corners = surface.disk().faces()[at.face as usize];
+                let of = |c: usize| -> f64 {
+                    corners.iter().zip(at.barycentric).map(|(&v, share)| share * of_vertices[v as usize][c]).sum()
+                };
+                let (right, up) = (x - 0.5 * extent[0], 0.5 * extent[1] - y);
+                assert!(
+                    (of(0) - right).abs() < 1e-6 && (of(1) - up).abs() < 1e-6,
+                    "{k}: {} {right}, {} {up}",
+                    of(0),
+                    of(1)
+                );
+                seen += 1;
+            }
+            assert!(seen > 100, "{seen}");
+        }
+    }
 }

@@ -5,6 +5,8 @@ pub mod adapters;
 pub mod appearance;
 #[cfg(all(feature = "autopilot", unix))]
 pub mod autopilot;
+#[cfg_attr(not(feature = "vr"), allow(dead_code, reason = "only what is designed on a page is given up halfway"))]
+mod cancellation;
 pub mod colour_design;
 pub mod colour_picture;
 pub mod console;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{Rotation3, Similarity3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::mesh_io::TriangleMesh;
@@ -96,6 +96,17 @@ pub struct PlacementResult {
     pub scale: f64,
     /// Whether a lying relief was turned upright.
     pub hung: bool,
+    /// Where a point of the mesh (about its origin) stands, metres, z up.
+    pub world_from_mesh: Similarity3<f64>,
+}
+
+impl PlacementResult {
+    /// Of a mesh that was turned about its middle, scaled and lifted.
+    fn new(turn: Rotation3<f64>, middle: Vector3<f64>, scale: f64, lift: Vector3<f64>, hung: bool) -> Self {
+        let rotation = UnitQuaternion::from_rotation_matrix(&turn);
+        let translation = lift - turn * middle * scale;
+        Self { scale, hung, world_from_mesh: Similarity3::new(translation, rotation.scaled_axis(), scale) }
+    }
 }
 
 /// Scales the mesh, turns its up axis to z, turns flat pieces upright like a wall that faces -x, and puts it over the origin clear
@@ -109,9 +120,9 @@ pub fn place_mesh(mesh: &mut TriangleMesh, placement: MeshPlacement) -> Result<P
     let turn = if hung { hang(&facing) * upright } else { upright };
     let middle = (low + high) / 2.0;
     transform(mesh, |p| turn * (p - middle) * scale);
-    let lift = CLEAR_OF_GROUND - bounds(mesh).0.z;
-    transform(mesh, |p| p + Vector3::new(0.0, 0.0, lift));
-    Ok(PlacementResult { scale, hung })
+    let lift = Vector3::new(0.0, 0.0, CLEAR_OF_GROUND - bounds(mesh).0.z);
+    transform(mesh, |p| p + lift);
+    Ok(PlacementResult::new(turn, middle, scale, lift, hung))
 }
 
 /// Scales a place of which a part is painted (metres, unless the placement says otherwise), turns its up axis to z, turns it about z
@@ -131,10 +142,11 @@ pub fn place_scene(scene: &mut Scene, placement: MeshPlacement) -> Result<Placem
         transform(mesh, |p| turn * (p - middle) * scale);
         lowest = lowest.min(bounds(mesh).0.z);
     }
+    let lift = Vector3::new(0.0, 0.0, CLEAR_OF_GROUND - lowest);
     for mesh in [&mut scene.canvas, &mut scene.obstacles] {
-        transform(mesh, |p| p + Vector3::new(0.0, 0.0, CLEAR_OF_GROUND - lowest));
+        transform(mesh, |p| p + lift);
     }
-    Ok(PlacementResult { scale, hung: false })
+    Ok(PlacementResult::new(turn, middle, scale, lift, false))
 }
 
 fn checked_bounds(mesh: &TriangleMesh) -> Result<(Vector3<f64>, Vector3<f64>), PlacementError> {
@@ -295,7 +307,7 @@ mod tests {
             ..TriangleMesh::default()
         };
         let mut scene =
-            Scene { canvas: part([[0, 1, 2], [0, 2, 3]]), obstacles: part([[4, 5, 6], [4, 6, 7]]), clean: Vec::new() };
+            Scene { canvas: part([[0, 1, 2], [0, 2, 3]]), obstacles: part([[4, 5, 6], [4, 6, 7]]), ..Scene::default() };
         assert!((mean_normal(&scene.canvas) - Vector3::y()).norm() < 1e-6);
         place_scene(&mut scene, MeshPlacement { scale: Some(0.5), up: UpAxis::Z }).unwrap();
         // Half as large, facing -x with the file's x to the robot's left: the box around all is 4 m by 1 m by 3 m.

@@ -2,6 +2,7 @@
 
 mod built_in_flyer;
 mod coats;
+mod coats_estimate;
 mod coats_output;
 mod collisions;
 mod colour_doses;
@@ -23,6 +24,7 @@ mod grounded;
 mod identify;
 mod inspect;
 mod kept_clean;
+mod known_surface;
 mod look;
 mod mission_output;
 mod nozzle;
@@ -67,6 +69,7 @@ mod written_file;
 
 pub use built_in_flyer::BuiltInFlyer;
 pub use coats::{Coat, CoatTasks, Coats, PlannedCoats};
+pub use coats_estimate::{CoatsEstimate, PaintEstimate, estimate_coats};
 pub use coats_output::{CoatsFigures, save_coats};
 pub use compared_flight::ComparedFlight;
 pub use decide_picture::{PictureDesign, decide_picture};
@@ -77,6 +80,7 @@ pub use fly::LayerFlight;
 pub use flyer::{Flight, Flyer, Purpose};
 pub use grounded::Grounded;
 pub use inspect::{Inspection, inspect};
+pub use known_surface::KnownSurface;
 pub use mission_output::save;
 pub use painting_task::PaintingTask;
 pub use picture_preview::{PicturePreview, preview_picture};

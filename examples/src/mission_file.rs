@@ -1,5 +1,6 @@
 //! A mission as a file: all that is needed to fly it again.
 
+mod known_surface;
 mod paints;
 mod picture;
 
@@ -307,13 +308,19 @@ impl MissionFile {
     /// Reads the design and decides.
     fn decide_on(&self, place: &Place) -> Result<PaintingTask, MissionFileError> {
         let Place { name, scene, .. } = place;
-        let settings = self.settings.clone();
-        let mesh = &scene.canvas;
+        let design = self.grey_design(&scene.canvas)?;
+        let task = PaintingTask::new(name, scene, &design, self.settings.clone());
+        task.and_then(|task| place.known(task)).map_err(|source| self.in_mesh(source))
+    }
+
+    /// The design of one paint.
+    fn grey_design(&self, mesh: &TriangleMesh) -> Result<Design, MissionFileError> {
+        let seed = self.settings.seed;
         let materials = mesh.materials.as_ref().filter(|materials| materials.textured() && mesh.uv.is_some());
-        let design = match (&self.texture, &self.design, materials) {
+        Ok(match (&self.texture, &self.design, materials) {
             _ if self.fill.is_some() => self.coat()?,
             (Some(texture), ..) => Design::Texture(Picture::open(texture)?),
-            (None, Some(name), _) if name != MATERIALS => Design::from_name(name, settings.seed)?,
+            (None, Some(name), _) if name != MATERIALS => Design::from_name(name, seed)?,
             (None, _, Some(materials)) => {
                 say!("{}wanted is the texture that the file names", self.mesh_prefix());
                 Design::from_materials(materials)?
@@ -322,10 +329,8 @@ impl MissionFile {
                 return Err(DesignError::Missing("textures of its own (OBJ with MTL, glTF)").into());
             }
             (None, None, None) if self.mesh.is_some() => Design::Stripes,
-            (None, None, None) => Design::Strata { seed: settings.seed },
-        };
-        let task = PaintingTask::new(name, scene, &design, settings);
-        task.and_then(|task| place.known(task)).map_err(|source| self.in_mesh(source))
+            (None, None, None) => Design::Strata { seed },
+        })
     }
 
     /// The design of an even coat.
@@ -404,7 +409,7 @@ impl MissionFile {
         let subject = if self.is_place() { Subject::Place } else { Subject::Object };
         let (scale, scale_said) = scale_of(&mesh, self.scale, subject);
         let placement = MeshPlacement { scale: Some(scale), up };
-        let (scene, placed) = if self.is_place() {
+        let (mut scene, placed) = if self.is_place() {
             let unit = if scale.is_finite() && scale > 0.0 { scale } else { 1.0 };
             let mut scene = self.select(&name, mesh, unit)?;
             let placed = place_scene(&mut scene, placement);
@@ -415,6 +420,7 @@ impl MissionFile {
             (Scene::whole(mesh), placed)
         };
         let placed = placed.map_err(|source| MissionFileError::Placement { path: name.clone(), source })?;
+        scene.world_from_mesh = placed.world_from_mesh;
         let hung = if placed.hung { ", hung like a wall" } else { "" };
         say!("{name}: {} faces, {scale_said}, {up_said}{hung}", scene.canvas.faces.len());
         Ok(scene)

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::{console, say};
+use crate::{cancellation, console, say};
 
 /// One stage under way.
 pub struct Stage {
@@ -25,7 +25,8 @@ const INTERVAL_S: u64 = 10;
 impl Stage {
     /// Announces a stage.
     pub fn start(name: &str) -> Self {
-        let bar = (std::io::stderr().is_terminal() && !console::is_quiet()).then(|| {
+        cancellation::check();
+        let bar = (std::io::stderr().is_terminal() && !console::is_quiet() && !console::is_heard()).then(|| {
             let bar = ProgressBar::new(1000);
             if let Ok(style) = ProgressStyle::with_template("{msg:28} [{bar:40}] {percent:>3} % {elapsed:>4}") {
                 bar.set_style(style.progress_chars("=> "));
@@ -38,6 +39,7 @@ impl Stage {
 
     /// Moves the bar to a share in `[0, 1]`.
     pub fn share(&self, share: f64) {
+        cancellation::check();
         let now = (1000.0 * share.clamp(0.0, 1.0)) as u64;
         let most = self.most.fetch_max(now, Ordering::Relaxed).max(now);
         if let Some(bar) = &self.bar {
@@ -60,6 +62,9 @@ impl Stage {
 
     /// A plain line, if none was printed for a while.
     fn line(&self, what: &str) {
+        if console::is_heard() {
+            return;
+        }
         let seconds = self.started.elapsed().as_secs();
         if self.told.fetch_max(seconds / INTERVAL_S, Ordering::Relaxed) < seconds / INTERVAL_S {
             say!("{:28} {what} ({seconds} s)", self.name);
@@ -74,6 +79,7 @@ impl Stage {
                 bar.finish_and_clear();
                 bar.suspend(|| say!("{line}"));
             }
+            None if console::is_heard() => {}
             None => say!("{line}"),
         }
     }

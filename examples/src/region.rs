@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Similarity3, Vector3};
 use serde::{Deserialize, Serialize};
 use uv_param::region::{
     DEFAULT_MEMORY_M, EditableMesh, EditableUv, Sample, divide_at_border, drop_small_parts, grow_to_creases,
@@ -84,6 +84,8 @@ pub struct Scene {
     pub obstacles: TriangleMesh,
     /// Faces of the canvas that stay clean, windows in a front; empty where there are none.
     pub clean: Vec<bool>,
+    /// Where a point of the mesh as it was read (about its origin) stands now.
+    pub world_from_mesh: Similarity3<f64>,
 }
 
 impl Scene {
@@ -264,7 +266,7 @@ fn separated(mut mesh: TriangleMesh, inside: &[bool]) -> Scene {
     let mut obstacles = TriangleMesh { positions, faces, colours, uv, materials, ..TriangleMesh::default() };
     keep_faces(&mut obstacles, &|face| !inside[face]);
     keep_faces(&mut mesh, &|face| inside[face]);
-    Scene { canvas: mesh, obstacles, clean: Vec::new() }
+    Scene { canvas: mesh, obstacles, ..Scene::default() }
 }
 
 fn keep_faces(mesh: &mut TriangleMesh, wanted: &dyn Fn(usize) -> bool) {

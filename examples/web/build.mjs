@@ -1,9 +1,15 @@
 // Builds the page into dist/, or with --check says whether dist/ is what the sources build to.
 import { build } from "esbuild";
 import { readFile, writeFile, mkdir } from "node:fs/promises";
+import { basename } from "node:path";
 
 const options = { bundle: true, minify: true, format: "esm", target: "es2022", legalComments: "none", write: false, metafile: true };
-const script = await build({ ...options, entryPoints: ["src/main.ts"] });
+// What both pages need is in a file of its own.
+const script = await build({
+  ...options, entryPoints: { app: "src/main.ts", design: "src/design.ts" }, splitting: true, outdir: "dist", chunkNames: "shared",
+});
+const scripts = Object.fromEntries(script.outputFiles.map(({ path, contents }) => [basename(path), Buffer.from(contents)]));
+if (Object.keys(scripts).length !== 3) throw new Error(`the program serves app.js, design.js and shared.js, not ${Object.keys(scripts)}`);
 // The page holds code of other projects: their licences go with it.
 const packages = new Set(
   Object.keys(script.metafile.inputs).flatMap((path) => path.match(/^node_modules\/((?:@[^/]+\/)?[^/]+)/)?.[1] ?? []),
@@ -15,9 +21,11 @@ const licences = await Promise.all(
   }),
 );
 const files = {
-  "app.js": Buffer.from(script.outputFiles[0].contents),
+  ...scripts,
   "index.html": await readFile("src/index.html"),
   "style.css": await readFile("src/style.css"),
+  "design.html": await readFile("src/design.html"),
+  "design.css": await readFile("src/design.css"),
   "licences.txt": Buffer.from(licences.join("\n\n")),
 };
 let size = 0;

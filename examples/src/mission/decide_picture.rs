@@ -37,14 +37,23 @@ pub fn decide_picture(
     folder: &Path,
     finish: &dyn Fn(PaintingTask) -> Result<PaintingTask, MissionError>,
 ) -> Result<CoatTasks, MissionError> {
-    let task = PaintingTask::undecided(name, scene, settings)?;
+    decide_picture_on(&PaintingTask::undecided(name, scene, settings)?, &scene.canvas, picture, folder, finish)
+}
+
+/// The same on a surface that is unwrapped already.
+pub(super) fn decide_picture_on(
+    task: &PaintingTask,
+    mesh: &TriangleMesh,
+    picture: PictureDesign,
+    folder: &Path,
+    finish: &dyn Fn(PaintingTask) -> Result<PaintingTask, MissionError>,
+) -> Result<CoatTasks, MissionError> {
     let PictureDesign { design, paints, wall } = picture;
-    let mesh: &TriangleMesh = &scene.canvas;
     let colours = design.on_surface(&task.surface, mesh, &task.settings.placement, task.settings.viewpoint)?;
     let (_, pixels) = task.surface.film_texels();
     let wall = WallSpectra::new(wall, &task.surface, mesh, &pixels)?;
-    let mut picture = PictureTask::separate(&task, &colours, &paints, wall, pixels)?;
-    let paintings = decide_colours(&task, &mut picture)?;
+    let mut picture = PictureTask::separate(task, &colours, &paints, wall, pixels)?;
+    let paintings = decide_colours(task, &mut picture)?;
     let ground = picture.mean_wall()?;
     // What is not needed is not flown.
     let needed = |(_, painting): &(usize, paint_net::Painting)| !painting.sprays.is_empty();

@@ -82,10 +82,15 @@ impl PaintingTask {
     /// Unwraps the surface, lays the design onto it and lets the painter decide. `name` is what the report calls the surface.
     pub fn new(name: &str, scene: &Scene, design: &Design, settings: MissionSettings) -> Result<Self, MissionError> {
         design.check_movable(&settings.placement, settings.viewpoint)?;
-        let mut task = Self::undecided(name, scene, settings)?;
+        Self::undecided(name, scene, settings)?.decided(design, &scene.canvas)
+    }
+
+    /// What was undecided, with a design on the mesh that its surface was made from.
+    pub(super) fn decided(self, design: &Design, mesh: &TriangleMesh) -> Result<Self, MissionError> {
+        let mut task = self;
         let settings = &task.settings;
         // Nothing is wanted beside the surface nor where it stays clean, and no more than the paint can show.
-        let wanted = design.on_surface(&task.surface, &scene.canvas, &settings.placement, settings.viewpoint)?;
+        let wanted = design.on_surface(&task.surface, mesh, &settings.placement, settings.viewpoint)?;
         let mut wanted = wanted.map(|ink| ink.min(task.appearance.ink().max_ink()));
         for (k, ink) in wanted.data_mut().iter_mut().enumerate() {
             *ink *= if task.clean[k] { 0.0 } else { task.coverage.data()[k] };
@@ -158,6 +163,14 @@ impl PaintingTask {
             truth: None,
             map: None,
         })
+    }
+
+    /// The same with other settings, of which those of the surface and of the robot have to be the same.
+    pub(super) fn with_settings(&self, settings: MissionSettings) -> Result<Self, MissionError> {
+        settings.check()?;
+        let paint = NamedPaint::built_in(settings.paint)?;
+        let task = Self { settings, started: Instant::now(), ..self.clone() };
+        task.with_paint(paint, &Substrate::sandstone())
     }
 
     /// What the painter decides about.
@@ -235,6 +248,13 @@ impl PaintingTask {
     /// Share of the surface's texels that the robot can serve.
     pub(super) fn share_in_reach(&self) -> f64 {
         share(&self.in_reach, &self.coverage)
+    }
+
+    /// Share of the texels that are not to stay clean which it cannot serve.
+    pub(super) fn out_of_reach_share(&self) -> f64 {
+        let open = self.coverage.data().iter().zip(&self.clean).filter(|(covered, clean)| **covered > 0.0 && !**clean);
+        let reached = self.in_reach.iter().filter(|&&reached| reached).count();
+        1.0 - reached as f64 / open.count().max(1) as f64
     }
 
     /// Share of the surface's texels that it could serve but for keep-out volumes and tether; `None` where there are none.

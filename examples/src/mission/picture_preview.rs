@@ -4,11 +4,10 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::coats::{CoatTasks, Look, PaintTime, looks, time_of_paints};
+use super::coats::{CoatTasks, Look};
+use super::coats_estimate::estimate_coats;
 use super::error::MissionError;
 use super::picture_figures::{save_out_of_gamut, wanted_looks};
-use super::plan::unrehearsed;
-use super::wet_surface::coats;
 use crate::pictures::Rgb;
 use crate::progress::Stage;
 use crate::report::save_figures;
@@ -59,26 +58,11 @@ impl PicturePreview {
 pub fn preview_picture(tasks: &CoatTasks, folder: &Path) -> Result<Option<PicturePreview>, MissionError> {
     let (Some(picture), Some(first)) = (&tasks.picture, tasks.coats.first()) else { return Ok(None) };
     let stage = Stage::start("preview");
-    let (mut times, mut kilograms) = (Vec::new(), Vec::new());
-    for coat in &tasks.coats {
-        let mission = unrehearsed(&coat.task)?;
-        let (flights, once) = (&mission.flights, mission.duration());
-        let (coats, drying) = coats(&coat.task);
-        let (many, again) = (coats as f64, coats as f64 - 1.0);
-        times.push(PaintTime { flown: many * once, waited: again * drying, drying });
-        kilograms
-            .push(flights.iter().map(|flight| flight.route.volume()).sum::<f64>() * coat.task.paint.liquid.density);
-        stage.share(times.len() as f64 / tasks.coats.len() as f64);
-    }
-    let task = &first.task;
-    let canvas = |task: &super::painting_task::PaintingTask| {
-        task.layers.last().map_or_else(|| task.coverage.map(|_| 0.0), |layer| layer.canvas.clone())
-    };
-    let layers = tasks.coats.iter().map(|coat| (&coat.task.paint.paint, canvas(&coat.task)));
-    let expected = looks(layers, &task.coverage, Some(picture))?;
+    let estimate = estimate_coats(tasks, &|share| stage.share(share))?;
+    let (task, expected) = (&first.task, &estimate.expected);
     let wanted = wanted_looks(picture, expected.len());
     let (width, height) = (task.surface.width(), task.surface.height());
-    for (looks, name) in [(&wanted, "wanted.png"), (&expected, "expected.png")] {
+    for (looks, name) in [(&wanted, "wanted.png"), (expected, "expected.png")] {
         let page = looks.iter().map(|look| look.as_ref().map(Look::srgb8));
         Rgb::of_page(width, height, page).save(&folder.join(name))?;
     }
@@ -87,11 +71,11 @@ pub fn preview_picture(tasks: &CoatTasks, folder: &Path) -> Result<Option<Pictur
         version: env!("CARGO_PKG_VERSION"),
         surface: task.name.clone(),
         seed: task.settings.seed,
-        paints: tasks.coats.iter().map(|coat| coat.task.paint.name.clone()).collect(),
-        flight_time_s: times.iter().map(|time| time.flown).sum(),
-        flight_time_s_by_paint: times.iter().map(|time| time.flown).collect(),
-        paint_kg_by_paint: kilograms,
-        mission_time_s: time_of_paints(&times),
+        paints: estimate.paints.iter().map(|paint| paint.name.clone()).collect(),
+        flight_time_s: estimate.flight_time_s,
+        flight_time_s_by_paint: estimate.paints.iter().map(|paint| paint.flight_time_s).collect(),
+        paint_kg_by_paint: estimate.paints.iter().map(|paint| paint.kilograms).collect(),
+        mission_time_s: estimate.mission_time_s,
         ciede2000_optimum_mean: picture.difference_in_gamut(&task.in_reach, |k| Some(picture.optimum[k])),
         out_of_gamut_share: picture.out_of_gamut_share(),
     };

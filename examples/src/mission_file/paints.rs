@@ -14,11 +14,7 @@ impl MissionFile {
             let place = self.place(folder)?;
             return self.decide_palette(palette, &place, folder);
         }
-        if self.wall.is_some() || self.available.is_some() {
-            return Err(MissionFileError::Palette(
-                "the wall and the paints to choose from belong to a palette: give one",
-            ));
-        }
+        self.check_palette()?;
         if self.paints.is_empty() {
             let coats = vec![Coat { folder: folder.to_owned(), task: self.decide(folder)? }];
             return Ok(CoatTasks { coats, picture: None });
@@ -35,6 +31,15 @@ impl MissionFile {
         };
         let coats = coats.into_iter().enumerate().map(decide).collect::<Result<_, MissionFileError>>()?;
         Ok(CoatTasks { coats, picture: None })
+    }
+
+    /// Refuses what only a palette would use.
+    pub(super) fn check_palette(&self) -> Result<(), MissionFileError> {
+        if self.palette.is_none() && (self.wall.is_some() || self.available.is_some()) {
+            let why = "the wall and the paints to choose from belong to a palette: give one";
+            return Err(MissionFileError::Palette(why));
+        }
+        Ok(())
     }
 
     /// The missions of one paint that this one is made of.

@@ -44,15 +44,23 @@ impl MissionFile {
                 "layers by intensity and looking again know one paint only: leave them out",
             ));
         }
-        let candidates = palette.candidates(self.available.as_deref())?;
-        let mesh = &place.scene.canvas;
+        let picture = self.picture_design(palette, &place.scene.canvas)?;
+        decide_picture(&place.name, &place.scene, picture, self.settings.clone(), folder, &|task| place.known(task))
+            .map_err(|source| self.in_mesh(source))
+    }
+
+    /// What to paint in colour, with what, on what.
+    pub(super) fn picture_design(
+        &self,
+        palette: &PaletteChoice,
+        mesh: &TriangleMesh,
+    ) -> Result<PictureDesign, MissionFileError> {
+        let paints = palette.candidates(self.available.as_deref())?;
         let (design, own_colours) = self.colour_design(mesh)?;
         let usual = if has_colours(mesh) && !own_colours && self.mesh.is_some() { Wall::Mesh } else { Wall::Sandstone };
         let wall = self.wall.unwrap_or(usual);
         say!("wall: {wall}");
-        let picture = PictureDesign { design, paints: candidates, wall };
-        decide_picture(&place.name, &place.scene, picture, self.settings.clone(), folder, &|task| place.known(task))
-            .map_err(|source| self.in_mesh(source))
+        Ok(PictureDesign { design, paints, wall })
     }
 
     /// The design in colour, and whether it is the mesh's own colours.

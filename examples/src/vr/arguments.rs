@@ -10,6 +10,8 @@ use super::settings::{Timing, VrSettings};
 use super::watch::WatchSource;
 use crate::mesh_frame::MeshScale;
 use crate::mesh_placement::UpAxis;
+use crate::mission::MissionSettings;
+use crate::mission_file::MissionFile;
 use crate::socket_address;
 
 /// Serves a page on which a person paints a surface by hand, in a headset or with mouse, keyboard or touch; the simulated robot
@@ -17,7 +19,7 @@ use crate::socket_address;
 #[derive(Debug, Clone, Parser)]
 #[command(
     version,
-    after_help = "Examples:\n  vr\n  vr --mesh bust.obj --offline --out out/bust\n  vr --listen 0.0.0.0:8090\n  vr --watch 127.0.0.1:8765\n  vr --watch out/paintcopter/mission.mcap\n  vr --replay out/vr/session.mcap --out out/again"
+    after_help = "Examples:\n  vr\n  vr --mesh bust.obj --offline --out out/bust\n  vr --listen 0.0.0.0:8090\n  vr --watch 127.0.0.1:8765\n  vr --watch out/paintcopter/mission.mcap\n  vr --design-page --mesh facade.ply --out out/facade\n  vr --replay out/vr/session.mcap --out out/again"
 )]
 pub struct Arguments {
     /// Surface to paint, OBJ, glTF, PLY, STL or OFF; the built-in rock wall if not given
@@ -61,6 +63,10 @@ pub struct Arguments {
     /// Show on the page what others do: host and port of a running `scan --live`, or a recording (mission.mcap of `paintcopter`, scan.mcap)
     #[arg(long, value_name = "ADDRESS|FILE", conflicts_with_all = ["mesh", "map", "offline", "replay", "experiment"])]
     pub(super) watch: Option<WatchSource>,
+    /// Serve a page on which a mission is designed: a picture is placed on the surface, parts of it are chosen or kept clean, and what would come out, its
+    /// time and its paint are shown; it writes mission.toml, which `paintcopter` flies
+    #[arg(long, conflicts_with_all = ["map", "offline", "replay", "experiment", "watch", "segment", "robot_speed", "texel", "spot", "timing"])]
+    pub(super) design_page: bool,
     /// Serve nothing, make an experiment of the VR paper: a simulated hand paints, or layers of paint are compared
     #[arg(long, conflicts_with = "replay")]
     pub(super) experiment: Option<Experiment>,
@@ -108,6 +114,13 @@ enum Up {
 }
 
 impl Arguments {
+    /// The mission that a design begins with: the surface, and nothing on it.
+    pub(super) fn mission(&self) -> MissionFile {
+        let VrSettings { mesh, scale, up, seed, .. } = self.settings();
+        let settings = MissionSettings { seed, ..MissionSettings::default() };
+        MissionFile { mesh, scale, up, settings, ..MissionFile::default() }
+    }
+
     /// What a new session is made with.
     pub(super) fn settings(&self) -> VrSettings {
         let mut settings = VrSettings {

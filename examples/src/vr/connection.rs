@@ -10,10 +10,9 @@ use tungstenite::{Error, Message, WebSocket};
 
 use super::client_lease::ClientLease;
 use super::event::Event;
+use super::page_kind::PageKind;
 use super::protocol::ClientMessage;
 
-/// Longest message, bytes: half a minute of states.
-const LONGEST_MESSAGE: usize = 1 << 20;
 /// Messages per second in the long run, and at once.
 const MESSAGES_PER_SECOND: f64 = 200.0;
 const BURST: f64 = 400.0;
@@ -42,6 +41,10 @@ pub(super) enum Inbound {
     Join { connection: u64, key: String, outbox: SyncSender<Outgoing> },
     /// Events of the person.
     Events { connection: u64, events: Vec<Event> },
+    /// What a page says that is not for painting.
+    Text { connection: u64, text: String },
+    /// A file from there.
+    File { connection: u64, bytes: Vec<u8> },
     /// A message was dropped: the person's page has to hear what has arrived.
     Dropped { connection: u64 },
     /// It is over.
@@ -52,13 +55,15 @@ pub(super) enum Inbound {
 pub(super) struct Inbox {
     sender: SyncSender<Inbound>,
     closed: AtomicBool,
+    /// What says something.
+    page: PageKind,
 }
 
 impl Inbox {
     /// With room for so many messages; the other end.
-    pub(super) fn new(room: usize) -> (Self, Receiver<Inbound>) {
+    pub(super) fn new(room: usize, page: PageKind) -> (Self, Receiver<Inbound>) {
         let (sender, receiver) = sync_channel(room);
-        (Self { sender, closed: AtomicBool::new(false) }, receiver)
+        (Self { sender, closed: AtomicBool::new(false), page }, receiver)
     }
 
     /// Waits for room if need be; whether anybody is there to hear it.
@@ -110,8 +115,8 @@ pub(super) fn serve_connection(
 ) {
     // Small messages must not wait for larger ones.
     if stream.set_write_timeout(Some(WRITE_TIME)).and_then(|()| stream.set_nodelay(true)).is_ok() {
-        let config =
-            WebSocketConfig::default().max_message_size(Some(LONGEST_MESSAGE)).max_frame_size(Some(LONGEST_MESSAGE));
+        let longest = Some(inbox.page.longest_message());
+        let config = WebSocketConfig::default().max_message_size(longest).max_frame_size(longest);
         let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
         let mut bucket = Bucket::new();
         let mut turn = || turn(&mut socket, connection, &mut bucket, inbox, outbox, counts);
@@ -154,7 +159,7 @@ fn turn(
     for _ in 0..AT_ONCE {
         match read_now(socket) {
             Ok(Some(message)) => {
-                if !take(&message, connection, bucket, inbox, counts) {
+                if !take(message, connection, bucket, inbox, counts) {
                     return false;
                 }
             }
@@ -200,22 +205,26 @@ fn read_now(socket: &mut WebSocket<TcpStream>) -> Result<Option<Message>, Error>
 }
 
 /// Hands a message to the session; whether the connection goes on.
-fn take(message: &Message, connection: u64, bucket: &mut Bucket, inbox: &Inbox, counts: &TrafficCounts) -> bool {
-    let events = match message {
-        Message::Text(text) => serde_json::from_str::<ClientMessage>(text).ok().map(|message| message.events),
-        Message::Ping(_) | Message::Pong(_) => return true,
-        Message::Close(_) => return false,
-        Message::Binary(_) | Message::Frame(_) => None,
+fn take(message: Message, connection: u64, bucket: &mut Bucket, inbox: &Inbox, counts: &TrafficCounts) -> bool {
+    let said = match (message, inbox.page) {
+        (Message::Ping(_) | Message::Pong(_), _) => return true,
+        (Message::Close(_), _) => return false,
+        (Message::Text(text), PageKind::Painting) => serde_json::from_str::<ClientMessage>(&text)
+            .ok()
+            .map(|message| Inbound::Events { connection, events: message.events }),
+        (Message::Text(text), PageKind::Design) => Some(Inbound::Text { connection, text: text.to_string() }),
+        (Message::Binary(bytes), PageKind::Design) => Some(Inbound::File { connection, bytes: bytes.into() }),
+        (Message::Binary(_) | Message::Frame(_), _) => None,
     };
-    let dropped = if events.is_none() {
+    let dropped = if said.is_none() {
         Some(&counts.malformed)
     } else if bucket.take() {
         None
     } else {
         Some(&counts.too_many)
     };
-    let inbound = match (dropped, events) {
-        (None, Some(events)) => Inbound::Events { connection, events },
+    let inbound = match (dropped, said) {
+        (None, Some(said)) => said,
         (counter, _) => {
             counter.unwrap_or(&counts.malformed).fetch_add(1, Ordering::Relaxed);
             Inbound::Dropped { connection }

@@ -143,6 +143,9 @@ pub enum VrError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A design cannot begin.
+    #[error("{0}")]
+    Design(String),
     /// The recording cannot be written.
     #[error(transparent)]
     Recorder(#[from] crate::recording::RecordingError),

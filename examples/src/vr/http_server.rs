@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use tungstenite::handshake::derive_accept_key;
 
 use super::client_lease::same;
+use super::page_kind::PageKind;
 use super::web_files::web_file;
 
 /// Longest head of a request, bytes.
@@ -23,6 +24,8 @@ const HEAD_TIME: Duration = Duration::from_secs(5);
 pub(super) struct HttpServer {
     /// Needed in every request where the program can be reached from elsewhere.
     pub(super) token: Option<String>,
+    /// Whose files are served.
+    pub(super) page: PageKind,
 }
 
 /// What a connection is.
@@ -88,7 +91,7 @@ impl HttpServer {
             );
             return Ok(HttpOutcome::Session { rest, answer, key: parameter(&request.query, "key") });
         }
-        match web_file(&request.path) {
+        match web_file(&request.path, self.page) {
             Some(file) => answer(stream, "200 OK", file.kind, file.bytes)?,
             None => answer(stream, "404 Not Found", "text/plain", b"There is nothing here.")?,
         }

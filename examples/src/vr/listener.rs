@@ -12,6 +12,7 @@ use super::client_lease::ClientLease;
 use super::connection::{Inbound, Inbox, TrafficCounts, serve_connection, turn_away};
 use super::error::VrError;
 use super::http_server::{HttpOutcome, HttpServer};
+use super::page_kind::PageKind;
 
 use crate::{result, say};
 
@@ -55,16 +56,16 @@ impl Listening {
 
 /// Listens, and prints the address to open. Anything but loopback is served only with a token, which is printed with it. `does` is what
 /// the page is for.
-pub(super) fn listen(address: SocketAddr, does: &str) -> Result<Listening, VrError> {
+pub(super) fn listen(address: SocketAddr, does: &str, page: PageKind) -> Result<Listening, VrError> {
     let refused = |source| VrError::Listen { address: address.to_string(), source };
     let listener = TcpListener::bind(address).map_err(refused)?;
     let address = listener.local_addr().map_err(refused)?;
     let token = if address.ip().is_loopback() { None } else { Some(secret()?) };
     announce(address, token.as_deref(), does);
-    let (inbox, events) = Inbox::new(INBOX);
+    let (inbox, events) = Inbox::new(INBOX, page);
     let counts = Arc::new(TrafficCounts::default());
     let state = Arc::new(ServerState {
-        http: HttpServer { token },
+        http: HttpServer { token, page },
         lease: ClientLease::default(),
         inbox,
         counts: Arc::clone(&counts),

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::arguments::{Arguments, Experiment};
 use super::counters::Traffic;
+use super::design::design;
 use super::error::VrError;
 use super::event::{Command, Event};
 use super::experiment::save_contour;
@@ -27,6 +28,10 @@ use crate::say;
 /// [`VrError`] names the input and the way out.
 pub fn run(arguments: &Arguments) -> Result<(), VrError> {
     let folder = &arguments.out;
+    if arguments.design_page {
+        let _finishing = Finishing::begin();
+        return design(arguments);
+    }
     run_folder::begin(folder, "vr").map_err(VrError::unwritable(folder))?;
     if let Some(path) = &arguments.replay {
         return replay(path, folder);

@@ -14,6 +14,7 @@ use super::error::VrError;
 use super::listener::{Listening, listen};
 use super::message::Notice;
 use super::output::save;
+use super::page_kind::PageKind;
 use super::protocol::{ServerMessage, patch, robot, surface, welcome};
 use super::session::{Handled, Session};
 use crate::interruption;
@@ -26,7 +27,7 @@ const WAIT: Duration = Duration::from_millis(11);
 
 /// Serves a session until the person ends it.
 pub(super) fn serve(arguments: &Arguments, mut session: Session) -> Result<(), VrError> {
-    let listening = listen(arguments.listen, "mouse, keyboard and touch paint")?;
+    let listening = listen(arguments.listen, "mouse, keyboard and touch paint", PageKind::Painting)?;
     let mut connection = Connection::default();
     loop {
         let ended = match listening.inbox.recv_timeout(WAIT) {

@@ -25,6 +25,7 @@ use super::error::VrError;
 use super::event::{Command, Event};
 use super::listener::{Listening, listen};
 use super::message::Notice;
+use super::page_kind::PageKind;
 use super::protocol::{Frame, PROTOCOL, ServerMessage};
 use crate::interruption;
 use crate::report::save_figures;
@@ -65,7 +66,7 @@ pub(super) fn watch(source: &WatchSource, arguments: &Arguments) -> Result<(), V
         WatchSource::Address(address) => Box::new(FoxgloveClient::connect(address)?),
         WatchSource::Recording(path) => Box::new(Recorded::open(path)?),
     };
-    let listening = listen(arguments.listen, "it shows what is watched")?;
+    let listening = listen(arguments.listen, "it shows what is watched", PageKind::Painting)?;
     let mut show = Show::new(feed);
     loop {
         let ended = match listening.inbox.recv_timeout(STEP) {
