@@ -59,6 +59,7 @@
 //! | VR paper, section V, deviation from the normal | [`Target::normal_deviation`] |
 //! | handheld paper, section IV, Eqs. (1)-(5) | [`gantry`] |
 //! | Paper II, sections 4 and 6, phases of a flight; failsafes, sorties: ours | [`onboard`] |
+//! | several robots on one surface at the same time: ours | [`mission::Team`], [`mission::Cells`], [`mission::MissionPlan::schedule`] |
 //! | VR paper, Algorithm 1, rules (a)-(e), latencies | [`teleop`] |
 //!
 //! | feature | brings |
