@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Point3, Vector3};
 use paint_sim::droplets::Droplets;
 use paint_sim::{SprayModel, Surface, TriangleSurface};
+use serde_json::json;
 
 use crate::cpu::median_seconds;
 use crate::npy;
@@ -126,4 +127,21 @@ pub fn run(folder: &Path, stand_off: f64, runs: usize) -> Result<Cast, Box<dyn E
     let misses = hits.iter().filter(|id| **id == NOTHING).count();
     let cpu_ms = 1e3 * median_seconds(runs, ids);
     Ok(Cast { triangles: faces.len(), rays: hits.len(), misses, cpu_ms })
+}
+
+/// [`run`], told as a line of JSON.
+///
+/// # Errors
+/// As [`run`].
+pub fn print(folder: &Path, stand_off: f64, runs: usize) -> Result<(), Box<dyn Error>> {
+    let cast = run(folder, stand_off, runs)?;
+    let per_second = cast.rays as f64 / cast.cpu_ms * 1e-3;
+    println!(
+        "{}",
+        json!({
+            "fig": "droplet_rays", "peer": "paint-sim", "rays": cast.rays, "triangles": cast.triangles, "runs": runs.max(1),
+            "cpu_ms": cast.cpu_ms, "million_per_second": per_second, "misses": cast.misses,
+        })
+    );
+    Ok(())
 }

@@ -214,7 +214,7 @@ fn main() -> ExitCode {
         Job::Paint { image, size, runs, passes: None } => painting::run(&image, size.into(), runs),
         Job::Colour { image, runs } => colours::run(&image, runs),
         Job::Calibration { folder, runs } => calibration::run(&folder, runs),
-        Job::Droplets { folder, stand_off, runs } => droplets(&folder, stand_off, runs),
+        Job::Droplets { folder, stand_off, runs } => droplet_rays::print(&folder, stand_off, runs),
         Job::Sim { count, runs } => sim(count as usize, runs),
         Job::Tsdf { stream, voxel, frames, threads, no_colour, out } => {
             tsdf(&stream, voxel, frames, threads.into(), !no_colour, out.as_deref())
@@ -332,20 +332,6 @@ fn textured(chart: &Chart) -> Result<String, std::fmt::Error> {
         writeln!(text, "f {a}/{a} {b}/{b} {c}/{c}")?;
     }
     Ok(text)
-}
-
-/// Droplets as rays.
-fn droplets(folder: &Path, stand_off: f64, runs: usize) -> Result<(), AnyError> {
-    let cast = droplet_rays::run(folder, stand_off, runs)?;
-    let per_second = cast.rays as f64 / cast.cpu_ms * 1e-3;
-    println!(
-        "{}",
-        json!({
-            "fig": "droplet_rays", "peer": "paint-sim", "rays": cast.rays, "triangles": cast.triangles, "runs": runs.max(1),
-            "cpu_ms": cast.cpu_ms, "million_per_second": per_second, "misses": cast.misses,
-        })
-    );
-    Ok(())
 }
 
 fn sim(count: usize, runs: usize) -> Result<(), AnyError> {

@@ -19,11 +19,12 @@ use super::settings::MissionSettings;
 use super::simulated_flight::reference;
 use super::sorties::{FlownPiece, Sorties, in_pieces};
 use super::spray_flights::FlownPaint;
-use super::trajectory_table::TRAJECTORY_STEP;
 use crate::onboard::{LocalisationFigures, Piece};
 use crate::progress::Stage;
 use crate::simulated_sensors::SHOT_STEP;
 
+/// Time between the samples that are kept of a flight, s.
+pub(super) const KEPT_STEP: f64 = 0.05;
 /// Flights of other sorties have seeds so far apart.
 const SORTIE: u64 = 0x1_0000;
 
@@ -118,7 +119,7 @@ pub(super) fn fly(
             let (flight, sorties) = fly_sorties(&plan, task, &faulty, layer as u64, &sprayed, flyer, &share)?;
             told = sorties;
             let landed = flight.samples.last().map_or(0.0, |sample| sample.time);
-            Ok((flight.timed_shots(SHOT_STEP), landed, flight.thinned(TRAJECTORY_STEP)))
+            Ok((flight.timed_shots(SHOT_STEP), landed, flight.thinned(KEPT_STEP)))
         };
         match fly_beside([&plan, &smoothing], task.met(), &task.robot, &faulty, layer as u64, counted) {
             Ok(((shots, landed, flight), [slam, locked])) => {

@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use super::error::MissionError;
+use super::fly::KEPT_STEP;
 use super::run::{Mission, one_after_another};
 use super::team::robot_file;
 use super::written_file::write;
 
 /// Seconds between two rows.
-pub(super) const TRAJECTORY_STEP: f64 = 0.05;
+pub(super) const TRAJECTORY_STEP: f64 = KEPT_STEP;
 
 /// `trajectory.csv` of each robot of some missions, the first paint's robots for all.
 pub(super) fn save_trajectories(missions: &[&Mission], folder: &Path) -> Result<(), MissionError> {

@@ -48,7 +48,7 @@ const estimated = (page, own = false) =>
     const { estimate, link } = window.design;
     const found = estimate();
     return found && found.number >= link.latest && link.left.size === 0 && (!own || found.own) && found.paints.length > 0;
-  }, own, { timeout: 60000 });
+  }, own, { timeout: 150000 });
 
 const onScreen = (page, point) => page.evaluate((point) => window.design.onScreen(point), point);
 /** The middle of the first face of what is painted. */

@@ -71,7 +71,12 @@ impl MissionPlan {
     /// [`Error::TeamTooNear`]; [`Error::Setting`].
     pub fn schedule(&mut self, team: &Team) -> Result<(), Error> {
         team.check()?;
-        schedule(&mut self.flights, team)
+        let flown: Vec<_> = self.flights.iter().map(|flight| (flight.turn, &flight.plan.trajectory)).collect();
+        let starts = schedule(&flown, team)?;
+        for (flight, start) in self.flights.iter_mut().zip(starts) {
+            flight.start = start;
+        }
+        Ok(())
     }
 
     /// From the first take-off to the last landing, s, as it is scheduled.

@@ -2,9 +2,9 @@
 
 use nalgebra::Point3;
 
-use super::flights::MissionFlight;
 use super::team::{Team, Turn};
 use crate::error::Error;
+use crate::trajectory::Trajectory;
 
 /// Time between two looks at a flight, s: the vehicle moves by a decimetre.
 const STEP: f64 = 0.2;
@@ -75,14 +75,14 @@ struct Block {
     flights: std::ops::Range<usize>,
 }
 
-/// Gives every flight its start, s. Each begins as soon as its robot is free and none comes too near to another:
+/// The start of every flight, s. Each begins as soon as its robot is free and none comes too near to another:
 /// first cells from the first robot on, second cells from the last, so that each moves on into a cell that has been left.
-pub(super) fn schedule(flights: &mut [MissionFlight], team: &Team) -> Result<(), Error> {
+pub(super) fn schedule(flights: &[(Turn, &Trajectory)], team: &Team) -> Result<Vec<f64>, Error> {
     let mut blocks: Vec<Block> = Vec::new();
-    for (k, flight) in flights.iter().enumerate() {
+    for (k, (turn, _)) in flights.iter().enumerate() {
         match blocks.last_mut() {
-            Some(block) if block.turn == flight.turn => block.flights.end = k + 1,
-            _ => blocks.push(Block { turn: flight.turn, flights: k..k + 1 }),
+            Some(block) if block.turn == *turn => block.flights.end = k + 1,
+            _ => blocks.push(Block { turn: *turn, flights: k..k + 1 }),
         }
     }
     let order = |Turn { layer, robot, shift }: Turn| {
@@ -90,6 +90,7 @@ pub(super) fn schedule(flights: &mut [MissionFlight], team: &Team) -> Result<(),
     };
     blocks.sort_by_key(|block| order(block.turn));
     let mut tracks = vec![Track::default(); team.robots];
+    let mut starts = vec![0.0; flights.len()];
     let (mut free, mut layer, mut begun, mut end) = (vec![0.0; team.robots], 0, 0.0, 0.0_f64);
     for Block { turn, flights: range } in blocks {
         if turn.layer != layer {
@@ -104,29 +105,28 @@ pub(super) fn schedule(flights: &mut [MissionFlight], team: &Team) -> Result<(),
                 .ok_or(Error::TeamTooNear { robot, apart: team.apart })?;
             tracks[robot].push(start, STEP, positions);
         }
-        for flight in &mut flights[range] {
-            flight.start = start;
-            start += flight.plan.trajectory.duration();
+        for k in range {
+            starts[k] = start;
+            start += flights[k].1.duration();
         }
         free[robot] = start;
         end = end.max(start);
     }
-    Ok(())
+    Ok(starts)
 }
 
 /// Positions of the vehicle through some flights, [`STEP`] apart.
-fn positions(flights: &[MissionFlight]) -> Vec<Point3<f64>> {
-    let total: f64 = flights.iter().map(|flight| flight.plan.trajectory.duration()).sum();
+fn positions(flights: &[(Turn, &Trajectory)]) -> Vec<Point3<f64>> {
+    let total: f64 = flights.iter().map(|(_, trajectory)| trajectory.duration()).sum();
     let mut positions = Vec::with_capacity((total / STEP) as usize + 2);
     let mut begun = 0.0;
-    for flight in flights {
-        let trajectory = &flight.plan.trajectory;
+    for (_, trajectory) in flights {
         while STEP * positions.len() as f64 <= begun + trajectory.duration() {
             positions.push(trajectory.sample(STEP * positions.len() as f64 - begun).position);
         }
         begun += trajectory.duration();
     }
-    positions.extend(flights.last().map(|flight| flight.plan.trajectory.sample(f64::MAX).position));
+    positions.extend(flights.last().map(|(_, trajectory)| trajectory.sample(f64::MAX).position));
     positions
 }
 
