@@ -8,6 +8,8 @@ use super::painting_task::PaintingTask;
 use super::wet_surface::{DriedSurface, WetSurface};
 use crate::progress::Stage;
 
+/// Flights that overlap by less than this, s, follow each other: a log ends with its last step.
+const TOUCH: f64 = 0.1;
 /// Parts of the spraying after which the surface is shown.
 const PARTS: usize = 3;
 
@@ -37,7 +39,7 @@ fn rounds<'a>(flights: impl Iterator<Item = FlownPaint<'a>>) -> Vec<Round> {
     flights.sort_by(|a, b| a.start.total_cmp(&b.start));
     let mut rounds: Vec<Round> = Vec::new();
     for FlownPaint { shots, duration, start, on_dry } in flights {
-        match rounds.last_mut().filter(|round| start < round.begun + round.duration && !on_dry) {
+        match rounds.last_mut().filter(|round| start + TOUCH < round.begun + round.duration && !on_dry) {
             Some(round) => {
                 let late = start - round.begun;
                 round.shots.extend(shots.iter().map(|(time, shot)| (late + time, *shot)));
