@@ -17,6 +17,7 @@ pub(crate) fn design_places(surface: &PaintSurface, viewpoint: Option<Viewpoint>
 
 /// Where every vertex of a surface lies on the plane of a design without a viewpoint: metres to the right of and above its middle, and the width and
 /// height of the plane.
+#[cfg(feature = "vr")]
 pub(crate) fn vertex_places(surface: &PaintSurface) -> (Vec<[f64; 2]>, [f64; 2]) {
     let (places, extent) = design_places(surface, None);
     let middle = extent.map(|side| 0.5 * side);
@@ -84,7 +85,7 @@ fn places_in_plane(
     (places, [0, 1].map(|c| (high[c] - low[c]).max(f64::MIN_POSITIVE)))
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "vr"))]
 mod tests {
     use super::*;
     use crate::mesh_io::TriangleMesh;

@@ -10,7 +10,9 @@ use std::path::Path;
 
 use foxglove::messages::{Log, SceneEntity, SceneUpdate, Timestamp, TriangleListPrimitive, log};
 
-pub(crate) use messages::{point, quaternion, rgb, scene, vector};
+pub(crate) use messages::{point, rgb, scene};
+#[cfg(any(feature = "handheld", feature = "scan", feature = "vr"))]
+pub(crate) use messages::{quaternion, vector};
 pub use origin::{Attachment, Origin};
 pub use paint_traces::PaintStyle;
 use recorded_robot::RecordedRobot;
