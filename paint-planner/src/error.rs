@@ -66,32 +66,6 @@ pub enum Error {
         /// Distance between the collision body and the surface, m (negative: overlap).
         clearance: f64,
     },
-    /// A surface without room for so many robots.
-    #[error(
-        "the strokes are {width:.1} m wide: there is room for {room} robots that stay {apart} m apart, not for {robots}: take fewer, or let them come \
-         nearer (`team.apart`)"
-    )]
-    TeamTooLarge {
-        /// Robots asked for.
-        robots: usize,
-        /// Level width of the strokes, m.
-        width: f64,
-        /// Distance asked for, m.
-        apart: f64,
-        /// Robots for which there is room.
-        room: usize,
-    },
-    /// A robot of a team that is in another's way whenever it flies.
-    #[error(
-        "robot {} comes nearer than {apart} m to another whenever it flies: take fewer robots, or let them come nearer (`team.apart`)",
-        robot + 1
-    )]
-    TeamTooNear {
-        /// The robot, from 0.
-        robot: usize,
-        /// Distance asked for, m.
-        apart: f64,
-    },
     /// Knots and durations given to [`Trajectory`](crate::trajectory::Trajectory) do not describe a curve.
     #[error("trajectory knot {index}: {what}")]
     Knot {

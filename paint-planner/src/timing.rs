@@ -13,8 +13,8 @@ use crate::trajectory::{Extrema, TIGHT, Trajectory};
 use crate::transit::between;
 use crate::world::VehicleState;
 use nalgebra::Vector4;
+pub(crate) use speed_profile::RestToRest;
 use speed_profile::SpeedProfile;
-pub(crate) use speed_profile::rest_to_rest;
 use time_law::{Edge, Retimed, retime};
 
 /// Metres of deviation that a radian of heading error counts as: about the lever of an arm.

@@ -180,6 +180,7 @@ pub(super) fn finish(task: &PaintingTask, mut draft: Draft) -> Result<Planned, M
     }
     let Draft { mut mission, seconds } = draft;
     mission.schedule(&task.settings.team)?;
+    say_of_robots_without_room(task, &mission);
     let PaintingTask { layers, surface, planned_robot, settings, .. } = task;
     let stage = Stage::start("compare");
     let mesh = MeshSurface(&surface.world);
@@ -216,6 +217,21 @@ pub(super) fn finish(task: &PaintingTask, mut draft: Draft) -> Result<Planned, M
     };
     stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre{again}{rehearsed}", 1e3 * planned.seconds / metres));
     Ok(planned)
+}
+
+/// Layers in which not all robots of the team find room.
+fn say_of_robots_without_room(task: &PaintingTask, mission: &MissionPlan) {
+    let asked = task.settings.team.robots;
+    for layer in 0..task.layers.len() {
+        let robots = mission.robots(layer);
+        if (1..asked).contains(&robots) {
+            let paint = &task.paint.name;
+            say!(
+                "{paint}, layer {}: wanted where there is room for {robots} of {asked} robots side by side",
+                layer + 1
+            );
+        }
+    }
 }
 
 /// Who plans the flights of a mission.

@@ -41,11 +41,12 @@ fn team_figures(
     if robots < 2 {
         return TeamFigures { robots, ..TeamFigures::default() };
     }
-    let mut tracks = vec![Track::default(); robots];
+    let (mut tracks, mut flown) = (vec![Track::default(); robots], 0);
     for (robot, start, step, positions) in flights {
         tracks[robot].push(start, step, positions);
+        flown = flown.max(robot + 1);
     }
-    TeamFigures { robots, robots_nearest_m: nearest_approach(&tracks), robots_flight_time_s: Some(seconds) }
+    TeamFigures { robots: flown, robots_nearest_m: nearest_approach(&tracks), robots_flight_time_s: Some(seconds) }
 }
 
 /// Of flights with their turns, the first of each cell of the first layer.

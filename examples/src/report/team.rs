@@ -5,7 +5,7 @@ use serde::Serialize;
 /// Figures of the robots of a mission.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct TeamFigures {
-    /// How many there are.
+    /// How many fly at the same time: fewer than asked for where there is no room.
     pub robots: usize,
     /// Least distance between two of them while they fly.
     #[serde(skip_serializing_if = "Option::is_none")]

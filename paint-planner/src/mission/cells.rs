@@ -33,30 +33,30 @@ struct Work {
 }
 
 impl Cells {
-    /// Cells of equal work for strokes of a team: one for one robot, two for each of several. Work is the time of the spot along the strokes, at the
-    /// speed of [`TimingSettings`](crate::timing::TimingSettings) or what the dose and the greatest flow allow, with a stop at the end of each.
+    /// Cells of equal work for strokes of a team: one for one robot, two for each of several, of as many robots as there is room for. Work is the
+    /// time of the spot along the strokes, at the speed of [`TimingSettings`](crate::timing::TimingSettings) or what the dose and the greatest flow allow, with a stop at the end of each.
     /// The cells lie along the level direction in which the strokes reach farthest.
     ///
     /// # Errors
-    /// [`Error::Setting`]; [`Error::TeamTooLarge`] where the strokes leave no room for cells that keep the robots apart.
+    /// [`Error::Setting`].
     pub fn of_equal_work(strokes: &[Vec<Target>], team: &Team, settings: &Settings) -> Result<Self, Error> {
         team.check()?;
         let along = farthest_level_direction(strokes);
-        if team.robots == 1 {
-            return Ok(Self { along, borders: Vec::new() });
-        }
         let mut work: Vec<Work> = strokes.iter().flat_map(|stroke| work_of(stroke, &along, settings)).collect();
         work.sort_by(|a, b| a.at.total_cmp(&b.at));
         let width = work.last().map_or(0.0, |last| last.at) - work.first().map_or(0.0, |first| first.at);
         let least = team.apart + BEYOND;
+        // All cells but the first and the last lie between two robots.
+        let robots = team.robots.min(1 + ((width - 1e-9) / (2.0 * least)) as usize);
+        if robots == 1 {
+            return Ok(Self { along, borders: Vec::new() });
+        }
         let total: f64 = work.iter().map(|work| work.time).sum();
-        let cells = 2 * team.robots;
+        let cells = 2 * robots;
         let divide = |most: f64| borders(&work, cells, least, most);
         let (mut low, mut high) = (total / cells as f64, total);
-        let Some(mut best) = divide(high) else {
-            let room = 1 + (width / (2.0 * least)) as usize;
-            return Err(Error::TeamTooLarge { robots: team.robots, width, apart: team.apart, room });
-        };
+        // All work in one cell leaves the others as narrow as they may be.
+        let mut best = divide(high).unwrap_or_default();
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
             match divide(middle) {
@@ -245,13 +245,15 @@ mod tests {
     }
 
     #[test]
-    fn a_narrow_wall_says_how_many_robots_it_has_room_for() {
-        let strokes = rows(8.0, &|_| 1e-6);
-        let refused = Cells::of_equal_work(&strokes, &Team { robots: 4, ..Team::default() }, &Settings::default());
-        let Err(Error::TeamTooLarge { robots: 4, room: 2, width, .. }) = refused else { panic!("{refused:?}") };
-        assert!((width - 8.0).abs() < 0.1);
-        let two = Team { robots: 2, ..Team::default() };
-        assert_eq!(Cells::of_equal_work(&strokes, &two, &Settings::default()).unwrap().count(), 4);
+    fn a_narrow_wall_is_divided_among_those_it_has_room_for() {
+        // A cell between two robots takes 2.5 m, and n robots have 2 n - 2 of them.
+        for (width, robots) in [(0.0, 1), (4.8, 1), (5.2, 2), (9.8, 2), (10.2, 3), (20.2, 4)] {
+            let strokes = rows(width, &|_| 1e-6);
+            let cells = Cells::of_equal_work(&strokes, &Team { robots: 4, ..Team::default() }, &Settings::default());
+            assert_eq!(cells.unwrap().count(), if robots == 1 { 1 } else { 2 * robots }, "{width} m");
+        }
+        let none = Cells::of_equal_work(&[], &Team { robots: 4, ..Team::default() }, &Settings::default());
+        assert_eq!(none.unwrap().count(), 1);
     }
 
     #[test]

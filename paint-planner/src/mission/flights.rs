@@ -58,21 +58,35 @@ impl MissionPlan {
         outcomes
     }
 
-    /// Where the last flight of a robot ends: the vehicle, and the last target.
-    pub fn end(&self, robot: usize) -> (Option<VehicleState>, Option<&Target>) {
-        let Some(last) = self.flights.iter().rfind(|flight| flight.turn.robot == robot) else { return (None, None) };
+    /// How many robots fly in a layer: fewer than the team has where there is no room for all.
+    pub fn robots(&self, layer: usize) -> usize {
+        self.flights
+            .iter()
+            .filter(|flight| flight.turn.layer == layer)
+            .map(|flight| flight.turn.robot + 1)
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Where a robot is before its next flight: where its last one has ended, the vehicle and the last target. Each layer of a team begins on the
+    /// ground.
+    pub fn end(&self, turn: Turn, team: &Team) -> (Option<VehicleState>, Option<&Target>) {
+        let before = |flight: &&MissionFlight| {
+            flight.turn.robot == turn.robot && (team.robots == 1 || flight.turn.layer == turn.layer)
+        };
+        let Some(last) = self.flights.iter().rfind(before) else { return (None, None) };
         (last.plan.waypoints.last().map(|w| w.state), last.route.targets.last())
     }
 
-    /// Gives every flight its start, the soonest at which no robot of the team comes nearer than [`Team::apart`] to another, planned
+    /// Gives every flight its start, the soonest at which no robot of the team comes nearer than [`Team::apart`] to another that flies, planned
     /// with some margin. One robot flies them one after another.
     ///
     /// # Errors
-    /// [`Error::TeamTooNear`]; [`Error::Setting`].
+    /// [`Error::Setting`].
     pub fn schedule(&mut self, team: &Team) -> Result<(), Error> {
         team.check()?;
         let flown: Vec<_> = self.flights.iter().map(|flight| (flight.turn, &flight.plan.trajectory)).collect();
-        let starts = schedule(&flown, team)?;
+        let starts = schedule(&flown, team);
         for (flight, start) in self.flights.iter_mut().zip(starts) {
             flight.start = start;
         }

@@ -106,22 +106,25 @@ impl<E: From<Error>> From<Error> for Refusal<E> {
 
 impl<R: Rehearsal + ?Sized> MissionPlanner<'_, R> {
     /// Adds the flights of a layer of paint, each robot's from where its own have ended so far. A team divides the strokes into [cells](Cells)
-    /// of equal work.
+    /// of equal work; where there is no room for all of its robots, the first ones fly ([`MissionPlan::robots`]).
     ///
     /// # Errors
     /// As [`plan_mission`]; a layer of which nothing is reachable is none, it adds to what the mission refused.
     pub fn add_strokes(&self, lifted: &LiftedStrokes, mission: &mut MissionPlan) -> Result<(), R::Error> {
         let (team, settings) = (&self.settings.team, &self.settings.planner);
         team.check()?;
-        if team.robots == 1 {
-            return self.add_layer(lifted.ordered(mission.end(0).1, settings)?, mission);
-        }
+        let cells = Cells::of_equal_work(&lifted.strokes, team, settings)?;
         let layer = next_layer(mission);
-        let cells = Cells::of_equal_work(&lifted.strokes, team, settings)?.divide(&lifted.strokes);
+        if cells.count() == 1 {
+            let turn = Turn { layer, ..Turn::default() };
+            return self.add_route(lifted.ordered(mission.end(turn, team).1, settings)?, turn, mission);
+        }
         let mut lost_volume = lifted.lost_volume;
-        for (cell, strokes) in cells.iter().enumerate().filter(|(_, strokes)| !strokes.is_empty()) {
+        for (cell, strokes) in
+            cells.divide(&lifted.strokes).iter().enumerate().filter(|(_, strokes)| !strokes.is_empty())
+        {
             let turn = Turn { layer, robot: cell / 2, shift: cell % 2 };
-            let mut route = Route::ordered(strokes, mission.end(turn.robot).1, settings)?;
+            let mut route = Route::ordered(strokes, mission.end(turn, team).1, settings)?;
             route.lost_volume = std::mem::take(&mut lost_volume);
             self.add_route(route, turn, mission)?;
         }
@@ -182,7 +185,8 @@ impl<R: Rehearsal + ?Sized> MissionPlanner<'_, R> {
         settings: Settings,
         mission: &mut MissionPlan,
     ) -> Result<bool, R::Error> {
-        let settings = Settings { start: mission.end(turn.robot).0.or(self.settings.planner.start), ..settings };
+        let settings =
+            Settings { start: mission.end(turn, &self.settings.team).0.or(self.settings.planner.start), ..settings };
         let refused = if route.targets.len() < 2 {
             NotServed::OutOfReach
         } else {

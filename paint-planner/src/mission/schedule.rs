@@ -3,7 +3,6 @@
 use nalgebra::Point3;
 
 use super::team::{Team, Turn};
-use crate::error::Error;
 use crate::trajectory::Trajectory;
 
 /// Time between two looks at a flight, s: the vehicle moves by a decimetre.
@@ -13,7 +12,7 @@ const DELAY: f64 = 1.0;
 /// Planned distances are larger than those asked for by this, m: wind, and what is between two looks.
 const MARGIN: f64 = 0.25;
 
-/// Where one robot is at any time: it waits where a flight begins or has ended.
+/// Where one robot is while it flies; a robot that waits is on the ground.
 #[derive(Debug, Clone, Default)]
 pub struct Track {
     pieces: Vec<TrackPiece>,
@@ -31,42 +30,41 @@ impl TrackPiece {
         self.start + self.step * (self.positions.len() - 1) as f64
     }
 
-    fn at(&self, time: f64) -> Point3<f64> {
-        let index = ((time - self.start) / self.step).round().max(0.0) as usize;
-        self.positions[index.min(self.positions.len() - 1)]
+    /// On the ground from half a step after its end on.
+    fn at(&self, time: f64) -> Option<Point3<f64>> {
+        self.positions.get(((time - self.start) / self.step).round().max(0.0) as usize).copied()
     }
 }
 
 impl Track {
-    /// Adds what follows: positions every `step` seconds from `start` on, m, world frame. Without any nothing is added.
+    /// Adds a flight that follows: positions every `step` seconds from `start` on, m, world frame. Without any nothing is added.
     pub fn push(&mut self, start: f64, step: f64, positions: Vec<Point3<f64>>) {
         if !positions.is_empty() {
             self.pieces.push(TrackPiece { start, step, positions });
         }
     }
 
-    /// When the last piece ends, s.
+    /// When the last flight ends, s.
     fn end(&self) -> f64 {
         self.pieces.last().map_or(0.0, TrackPiece::end)
     }
 
     fn at(&self, time: f64) -> Option<Point3<f64>> {
         let begun = self.pieces.partition_point(|piece| piece.start <= time);
-        self.pieces.get(begun.saturating_sub(1)).map(|piece| piece.at(time))
+        self.pieces[..begun].last()?.at(time)
     }
 }
 
-/// Least distance between two of some robots from their first to their last motion, m; `None` for fewer than two.
+/// Least distance between two of some robots while both fly, m; `None` if that never is.
 pub fn nearest_approach(tracks: &[Track]) -> Option<f64> {
     let until = tracks.iter().map(Track::end).fold(0.0, f64::max);
-    let tracks: Vec<&Track> = tracks.iter().filter(|track| !track.pieces.is_empty()).collect();
-    let times = || (0..=(until / STEP).ceil() as usize).map(|k| STEP * k as f64);
     let pairs = (0..tracks.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
     let apart = |(a, b): (usize, usize)| {
+        let times = (0..=(until / STEP).ceil() as usize).map(|k| STEP * k as f64);
         let distance = |time| tracks[a].at(time).zip(tracks[b].at(time)).map(|(p, q)| (p - q).norm());
-        times().filter_map(distance).fold(f64::INFINITY, f64::min)
+        times.filter_map(distance).reduce(f64::min)
     };
-    pairs.map(apart).reduce(f64::min)
+    pairs.filter_map(apart).reduce(f64::min)
 }
 
 /// Flights that follow each other without a pause: those of a robot in one cell.
@@ -77,7 +75,7 @@ struct Block {
 
 /// The start of every flight, s. Each begins as soon as its robot is free and none comes too near to another:
 /// first cells from the first robot on, second cells from the last, so that each moves on into a cell that has been left.
-pub(super) fn schedule(flights: &[(Turn, &Trajectory)], team: &Team) -> Result<Vec<f64>, Error> {
+pub(super) fn schedule(flights: &[(Turn, &Trajectory)], team: &Team) -> Vec<f64> {
     let mut blocks: Vec<Block> = Vec::new();
     for (k, (turn, _)) in flights.iter().enumerate() {
         match blocks.last_mut() {
@@ -97,12 +95,10 @@ pub(super) fn schedule(flights: &[(Turn, &Trajectory)], team: &Team) -> Result<V
             (layer, begun) = (turn.layer, end);
         }
         let robot = turn.robot;
-        let soonest = f64::max(free[robot], begun);
-        let mut start = soonest;
+        let mut start = f64::max(free[robot], begun);
         if team.robots > 1 {
             let positions = positions(&flights[range.clone()]);
-            start = conflict_free(&tracks, robot, positions.clone(), soonest, team.apart + MARGIN)
-                .ok_or(Error::TeamTooNear { robot, apart: team.apart })?;
+            start = conflict_free(&tracks, robot, &positions, start, team.apart + MARGIN);
             tracks[robot].push(start, STEP, positions);
         }
         for k in range {
@@ -112,7 +108,7 @@ pub(super) fn schedule(flights: &[(Turn, &Trajectory)], team: &Team) -> Result<V
         free[robot] = start;
         end = end.max(start);
     }
-    Ok(starts)
+    starts
 }
 
 /// Positions of the vehicle through some flights, [`STEP`] apart.
@@ -130,37 +126,16 @@ fn positions(flights: &[(Turn, &Trajectory)]) -> Vec<Point3<f64>> {
     positions
 }
 
-/// The soonest start of what a robot flies at which it stays `apart` from the others, m, waiting and flying; `None` if it never does.
-fn conflict_free(tracks: &[Track], robot: usize, positions: Vec<Point3<f64>>, soonest: f64, apart: f64) -> Option<f64> {
+/// The soonest start of what a robot flies at which it stays `apart` from the others, m: when all others have landed at the latest.
+fn conflict_free(tracks: &[Track], robot: usize, positions: &[Point3<f64>], soonest: f64, apart: f64) -> f64 {
     let others: Vec<&Track> = tracks.iter().enumerate().filter(|(k, _)| *k != robot).map(|(_, track)| track).collect();
-    // From then on the others wait.
-    let quiet = others.iter().map(|track| track.end()).fold(soonest, f64::max);
-    let waits_from = if tracks[robot].pieces.is_empty() { 0.0 } else { tracks[robot].end() };
-    let mut track = tracks[robot].clone();
-    track.push(soonest, STEP, positions);
-    let last = track.pieces.len() - 1;
-    let too_near = |track: &Track, time: f64| {
-        let here = track.at(time);
-        let near = |other: &&Track| here.zip(other.at(time)).is_some_and(|(p, q)| (p - q).norm() < apart);
-        others.iter().any(near)
+    let landed = others.iter().map(|track| track.end()).fold(soonest, f64::max) + STEP;
+    let too_near = |place: &Point3<f64>, time: f64| {
+        others.iter().any(|other| other.at(time).is_some_and(|there| (place - there).norm() < apart))
     };
-    for attempt in 0.. {
-        let start = soonest + DELAY * f64::from(attempt);
-        if start > quiet + DELAY {
-            break;
-        }
-        track.pieces[last].start = start;
-        let until = quiet.max(track.end());
-        let looks = ((until - waits_from) / STEP).ceil() as usize;
-        let conflict = (0..=looks).map(|k| waits_from + STEP * k as f64).find(|time| too_near(&track, *time));
-        match conflict {
-            None => return Some(start),
-            // Where it waits it is in the way of another, which no later start changes.
-            Some(time) if time < start && last > 0 => return None,
-            Some(_) => {}
-        }
-    }
-    None
+    let conflict = |start: &f64| (0..).zip(positions).any(|(k, place)| too_near(place, start + STEP * f64::from(k)));
+    let starts = (0..).map(|attempt| soonest + DELAY * f64::from(attempt)).take_while(|start| *start < landed);
+    starts.into_iter().find(|start| !conflict(start)).unwrap_or(landed)
 }
 
 #[cfg(test)]
@@ -173,24 +148,27 @@ mod tests {
         (0..=steps).map(|k| Point3::new(0.0, from + (to - from) * k as f64 / steps as f64, 1.0)).collect()
     }
 
-    /// Another waits at 7 m until 20 s, and goes on to 13 m then. Who comes from 0 to 8 m may be at 5 m at 20 s: he starts at 15 s.
+    /// Another comes from 7 to 13 m from 20 s on. Who comes from 0 to 8 m may be at 5 m at 20 s, and follows it from then on.
     #[test]
     fn a_robot_starts_when_another_has_left() {
         let mut other = Track::default();
         other.push(20.0, STEP, way(7.0, 13.0));
         let tracks = [Track::default(), other];
-        let start = conflict_free(&tracks, 0, way(0.0, 8.0), 0.0, 2.0).unwrap();
+        assert_eq!(conflict_free(&tracks, 0, &way(0.0, 4.0), 3.0, 2.0), 3.0, "it is in nobody's way");
+        assert_eq!(conflict_free(&tracks, 0, &way(0.0, 8.0), 0.0, 2.0), 0.0, "at 8 m it lands");
+        let start = conflict_free(&tracks, 0, &way(0.0, 8.0), 13.0, 2.0);
         assert!((14.9..=16.1).contains(&start), "{start}");
-        assert_eq!(conflict_free(&tracks, 0, way(0.0, 4.0), 3.0, 2.0), Some(3.0), "it is in nobody's way");
-        assert_eq!(conflict_free(&tracks, 0, way(0.0, 12.0), 0.0, 2.0), None, "the other stays at 13 m");
+        // The other is at 13 m until 26 s: at 12 m one may be when it has landed.
+        let start = conflict_free(&tracks, 0, &way(0.0, 12.0), 14.5, 2.0);
+        assert!((14.9..=16.1).contains(&start), "{start}");
     }
 
-    /// One that waits at 6 m after its first flight is in the way of another that comes to 5 m at 10 s, whenever it goes on to 0 m.
+    /// Who flies towards another is kept on the ground until that has landed.
     #[test]
-    fn a_robot_that_waits_in_the_way_is_told_of() {
-        let (mut own, mut other) = (Track::default(), Track::default());
-        own.push(0.0, STEP, way(8.0, 6.0));
+    fn a_robot_waits_until_another_has_landed() {
+        let mut other = Track::default();
         other.push(0.0, STEP, way(15.0, 5.0));
-        assert_eq!(conflict_free(&[own, other], 0, way(6.0, 0.0), 9.0, 2.0), None);
+        let start = conflict_free(&[Track::default(), other], 0, &way(5.0, 15.0), 1.0, 2.0);
+        assert!((10.0..=11.0).contains(&start), "{start}");
     }
 }

@@ -1,5 +1,7 @@
 //! A tour over oriented strokes: nearest neighbour, then 2-opt and Or-opt until neither helps.
 
+use std::ops::Range;
+
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 
@@ -51,8 +53,7 @@ impl Tour {
 
     /// Seconds of all transits.
     pub(super) fn duration(&self, cost: &TransitCost) -> f64 {
-        let first = self.entries.first().map_or(0.0, |&end| cost.first(end));
-        first + self.entries.windows(2).map(|pair| cost.between(other(pair[0]), pair[1])).sum::<f64>()
+        duration(&self.entries, 0..self.entries.len(), cost)
     }
 
     pub(super) fn into_strokes(self) -> Vec<OrderedStroke> {
@@ -70,16 +71,17 @@ impl Tour {
         }
         // Where stretches are exchanged decides only how soon a good order is found.
         let mut random = SplitMix64::seed_from_u64(count as u64);
-        let mut best = self.duration(cost);
+        let mut before = self.entries.clone();
         for _ in 0..(KICKS_PER_STROKE * count).min(MAX_KICKS) {
-            let before = self.entries.clone();
             let touched = self.exchange_stretches(&mut random);
             self.improve_around(touched, &neighbours, cost);
-            let now = self.duration(cost);
-            if now < best - GAIN {
-                best = now;
+            let differs = |at: &usize| before[*at] != self.entries[*at];
+            let Some(from) = (0..count).find(differs) else { continue };
+            let to = (from..count).rev().find(differs).map_or(from, |last| last + 1);
+            if duration(&self.entries, from..to, cost) < duration(&before, from..to, cost) - GAIN {
+                before[from..to].copy_from_slice(&self.entries[from..to]);
             } else {
-                self.entries = before;
+                self.entries[from..to].copy_from_slice(&before[from..to]);
             }
         }
     }
@@ -149,9 +151,8 @@ impl Tour {
             }
             let before =
                 self.way_into(from, self.entries[from], cost) + self.way_out_of(to, other(self.entries[to]), cost);
-            let after =
-                self.way_into(from, other(self.entries[to]), cost) + self.way_out_of(to, self.entries[from], cost);
-            if after < before - GAIN {
+            let into = self.way_into(from, other(self.entries[to]), cost);
+            if into < before - GAIN && into + self.way_out_of(to, self.entries[from], cost) < before - GAIN {
                 reverse(&mut self.entries[from..=to]);
                 return true;
             }
@@ -174,8 +175,9 @@ impl Tour {
                 for slot in [there, there + 1].into_iter().filter(|slot| !(from..=to).contains(slot)) {
                     let open = removed + self.gap(slot, cost) - GAIN;
                     for (turned, first, last) in [(false, first, last), (true, last, first)] {
-                        let out = self.entries.get(slot).map_or(0.0, |&next| cost.between(last, next));
-                        if self.way_into(slot, first, cost) + out < open {
+                        let into = self.way_into(slot, first, cost);
+                        let out = || self.entries.get(slot).map_or(0.0, |&next| cost.between(last, next));
+                        if into < open && into + out() < open {
                             self.shift(from, to, slot, turned);
                             return true;
                         }
@@ -220,6 +222,13 @@ impl Tour {
     }
 }
 
+/// Seconds of the transits into and out of a range of strokes.
+fn duration(entries: &[End], range: Range<usize>, cost: &TransitCost) -> f64 {
+    let first = if range.start == 0 { entries.first().map_or(0.0, |&end| cost.first(end)) } else { 0.0 };
+    let about = &entries[range.start.saturating_sub(1)..entries.len().min(range.end + 1)];
+    first + about.windows(2).map(|pair| cost.between(other(pair[0]), pair[1])).sum::<f64>()
+}
+
 /// The other way round: last stroke first, each entered where it was left.
 fn reverse(run: &mut [End]) {
     run.reverse();
@@ -259,6 +268,26 @@ mod tests {
     use crate::settings::Settings;
     use crate::target::Target;
     use nalgebra::{Point3, Vector3};
+
+    /// What changes in a range is what changes in the whole flight.
+    #[test]
+    fn a_range_has_the_transits_into_it_and_out_of_it() {
+        let target = |k: u32| {
+            let point = Point3::new(0.0, f64::from(k * 7 % 11), f64::from(k * 5 % 13));
+            Target { point, normal: -Vector3::x_axis(), dose: 0.0, time: None, stand_off: None }
+        };
+        let strokes: Vec<StrokeEnds> =
+            (0..8).map(|k| StrokeEnds { first: target(2 * k), last: target(2 * k + 1) }).collect();
+        let cost = TransitCost::new(&strokes, Some(&target(40)), &Settings::default());
+        let before: Vec<End> = (0..8).map(|stroke| 2 * stroke).collect();
+        for range in [0..8, 0..3, 2..5, 4..8] {
+            let mut after = before.clone();
+            reverse(&mut after[range.clone()]);
+            let whole = duration(&after, 0..8, &cost) - duration(&before, 0..8, &cost);
+            let part = duration(&after, range.clone(), &cost) - duration(&before, range.clone(), &cost);
+            assert!(whole.abs() > 0.1 && (whole - part).abs() < 1e-9, "{range:?}: {whole} {part}");
+        }
+    }
 
     /// Dots in a row, flown in another order than they lie in: Or-opt puts the one that is out of place where it belongs.
     #[test]

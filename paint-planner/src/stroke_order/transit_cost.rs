@@ -1,11 +1,11 @@
 //! Estimated duration of a transit between two ends of strokes.
 
 use super::stroke::StrokeEnds;
-use crate::angle::wrap;
-use crate::settings::{Settings, TimingPolicy, TimingSettings};
+use crate::settings::{Settings, TimingPolicy};
 use crate::target::Target;
-use crate::timing::rest_to_rest;
+use crate::timing::RestToRest;
 use nalgebra::Point3;
+use std::f64::consts::TAU;
 
 /// Length of a unit normal seen from above below which it gives no heading.
 const MIN_LEVEL_NORMAL: f64 = 0.3;
@@ -30,8 +30,11 @@ struct Place {
 pub(super) struct TransitCost {
     places: Vec<Place>,
     from: Option<Place>,
-    timing: TimingSettings,
+    flight: RestToRest,
     break_length: f64,
+    /// Of a stroke that goes on with the valve shut: s/m and s/rad.
+    per_metre: f64,
+    per_radian: f64,
 }
 
 impl TransitCost {
@@ -43,11 +46,17 @@ impl TransitCost {
                 facing: (level.norm() > MIN_LEVEL_NORMAL).then(|| level.y.atan2(level.x)),
             }
         };
+        let speed = match settings.timing.policy {
+            TimingPolicy::Uniform { speed } => speed.min(settings.timing.max_speed),
+            TimingPolicy::GradientPreserving => settings.timing.max_speed,
+        };
         Self {
             places: strokes.iter().flat_map(|stroke| [place(&stroke.first), place(&stroke.last)]).collect(),
             from: from.map(place),
-            timing: settings.timing.clone(),
+            flight: RestToRest::new(&settings.timing),
             break_length: settings.break_length,
+            per_metre: 1.0 / speed,
+            per_radian: 1.0 / settings.timing.max_heading_rate,
         }
     }
 
@@ -73,15 +82,13 @@ impl TransitCost {
 
     fn duration(&self, a: &Place, b: &Place) -> f64 {
         let travel = (b.nozzle - a.nozzle).norm();
-        let turn = a.facing.zip(b.facing).map_or(0.0, |(a, b)| wrap(b - a).abs());
+        // Both lie within half a turn of zero, so that the way round is one turn less at most.
+        let turn = a.facing.zip(b.facing).map_or(0.0, |(a, b)| (b - a).abs());
+        let turn = turn.min((TAU - turn).abs());
         if travel <= self.break_length {
-            // No flight of its own: the stroke goes on with the valve shut.
-            let speed = match self.timing.policy {
-                TimingPolicy::Uniform { speed } => speed.min(self.timing.max_speed),
-                TimingPolicy::GradientPreserving => self.timing.max_speed,
-            };
-            return (travel / speed).max(turn / self.timing.max_heading_rate);
+            // No flight of its own.
+            return (self.per_metre * travel).max(self.per_radian * turn);
         }
-        rest_to_rest(travel, turn, &self.timing)
+        self.flight.duration(travel, turn)
     }
 }

@@ -121,7 +121,7 @@ impl SpeedProfile {
                 let moving = if sum > 1e-6 {
                     2.0 * self.travel[i] / sum
                 } else {
-                    rest_to_rest(self.travel[i], self.turn[i], settings)
+                    RestToRest::new(settings).duration(self.travel[i], self.turn[i])
                 };
                 moving.max(min_duration)
             })
@@ -172,13 +172,28 @@ pub(crate) fn joint_motion(from: &VehicleState, to: &VehicleState) -> f64 {
     (to.pan - from.pan).abs().max((to.tilt - from.tilt).abs())
 }
 
-/// Time between two halts, s: the closed form of the minimum-snap polynomial over `travel` metres and `turn` radians.
-pub(crate) fn rest_to_rest(travel: f64, turn: f64, settings: &TimingSettings) -> f64 {
-    let by_speed = PEAK_SPEED * travel / settings.max_speed;
-    let by_turn = PEAK_SPEED * turn / settings.max_heading_rate;
-    let by_acceleration = (PEAK_ACCELERATION * travel / settings.max_acceleration).sqrt();
-    // The certificate may exceed the closed form in the last digits.
-    1.001 * by_speed.max(by_turn).max(by_acceleration)
+/// Time between two halts, s: the closed form of the minimum-snap polynomial.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RestToRest {
+    per_metre: f64,
+    per_root_metre: f64,
+    per_radian: f64,
+}
+
+impl RestToRest {
+    pub(crate) fn new(settings: &TimingSettings) -> Self {
+        // The certificate may exceed the closed form in the last digits.
+        Self {
+            per_metre: 1.001 * PEAK_SPEED / settings.max_speed,
+            per_root_metre: 1.001 * (PEAK_ACCELERATION / settings.max_acceleration).sqrt(),
+            per_radian: 1.001 * PEAK_SPEED / settings.max_heading_rate,
+        }
+    }
+
+    /// Over `travel` metres and `turn` radians.
+    pub(crate) fn duration(&self, travel: f64, turn: f64) -> f64 {
+        (self.per_metre * travel).max(self.per_root_metre * travel.sqrt()).max(self.per_radian * turn)
+    }
 }
 
 /// Length of stroke on the surface between two route points, m, and the dose on it; zero on flights.

@@ -1,7 +1,11 @@
 //! Several robots on one wall.
 
-use paint_planner::mission::{MissionPlan, MissionSettings, NoRehearsal, Team, Track, nearest_approach, plan_mission};
+use paint_planner::mission::{
+    LiftedStrokes, MissionPlan, MissionPlanner, MissionSettings, NoRehearsal, Team, Track, nearest_approach,
+    plan_mission,
+};
 use paint_planner::nalgebra::Point3;
+use paint_planner::plan::OptimalPlanner;
 use paint_planner::{Error, Target};
 
 use crate::walls::{Arm, Wall};
@@ -79,25 +83,59 @@ fn each_robot_stays_in_its_own_part() {
             .flat_map(|f| f.route.targets.iter().map(|t| t.point.y))
     };
     assert!(y(0).fold(f64::MIN, f64::max) <= y(1).fold(f64::MAX, f64::min) + 0.1);
+    // From the first moment on.
+    for flight in &two.flights {
+        let first = flight.plan.trajectory.sample(0.0).position.y;
+        assert_eq!(flight.turn.robot, usize::from(first > y(1).fold(f64::MAX, f64::min) - 0.1), "{first} m");
+    }
+}
+
+/// A second layer has room for one robot, where the second one's first layer ends.
+#[test]
+fn a_layer_without_room_for_all_is_flown_by_fewer() {
+    let wide = strokes();
+    let narrow: Vec<Vec<Target>> = wide
+        .iter()
+        .map(|row| row.iter().filter(|target| (7.0..9.0).contains(&target.point.y)).copied().collect())
+        .collect();
+    assert!(narrow.iter().all(|row: &Vec<Target>| row.len() > 5));
+    let team = Team { robots: 2, ..Team::default() };
+    let (planner, wall, arm) = (OptimalPlanner::default(), Wall::flat(), Arm::default());
+    let settings = MissionSettings { team, ..MissionSettings::default() };
+    let planner = MissionPlanner { planner: &planner, surface: &wall, tool: &arm, rehearsal: &NoRehearsal, settings };
+    let mut mission = MissionPlan::default();
+    for strokes in [wide, Vec::new(), narrow] {
+        planner.add_strokes(&LiftedStrokes { strokes, lost_volume: 0.0 }, &mut mission).unwrap();
+    }
+    mission.schedule(&team).unwrap();
+    assert_eq!([0, 1, 2].map(|layer| mission.robots(layer)), [2, 1, 0]);
+    // From the ground, not from where the first layer has ended.
+    let far = |k: usize| (7.0..9.0).contains(&mission.flights[k].plan.trajectory.sample(0.0).position.y);
+    assert!((0..mission.flights.len()).filter(|k| mission.flights[*k].turn.layer == 1).take(1).all(far));
+    let first_ends = |f: &&paint_planner::mission::MissionFlight| f.start + f.plan.trajectory.duration();
+    let (first, second): (Vec<_>, Vec<_>) = mission.flights.iter().partition(|flight| flight.turn.layer == 0);
+    let end = first.iter().map(first_ends).fold(0.0, f64::max);
+    assert!(second.iter().all(|flight| flight.start >= end - 1e-9));
+    assert_eq!(mission.outcomes().not_served(), 0);
 }
 
 #[test]
-fn a_team_without_room_or_sense_is_refused() {
-    let refused = planned(&strokes(), Team { robots: 3, ..Team::default() });
-    let Err(Error::TeamTooLarge { room, .. }) = refused else { panic!("{refused:?}") };
-    assert!(planned(&strokes(), Team { robots: room, ..Team::default() }).is_ok() && room == 2);
+fn a_team_without_sense_is_refused() {
     for team in [Team { robots: 0, ..Team::default() }, Team { apart: f64::NAN, ..Team::default() }] {
         assert!(matches!(planned(&strokes(), team), Err(Error::Setting { .. })));
     }
 }
 
 #[test]
-fn the_nearest_approach_counts_waiting() {
+fn the_nearest_approach_is_that_of_flying_robots() {
     let at = |y: f64| Point3::new(0.0, y, 0.0);
     let (mut one, mut other) = (Track::default(), Track::default());
     one.push(0.0, 1.0, (0..=10).map(|k| at(f64::from(k))).collect());
-    // Waits at 20 m until 30 s, long after the other has come to 10 m; then comes to 13 m.
-    other.push(30.0, 1.0, (0..=7).map(|k| at(20.0 - f64::from(k))).collect());
-    assert_eq!(nearest_approach(&[one.clone(), other]), Some(3.0));
-    assert_eq!(nearest_approach(&[one]), None);
+    // From 20 to 13 m from 5 s on: 5 m apart when the first lands.
+    other.push(5.0, 1.0, (0..=7).map(|k| at(20.0 - f64::from(k))).collect());
+    assert_eq!(nearest_approach(&[one.clone(), other.clone()]), Some(5.0));
+    // A second flight of the first, past the second one's place after that has landed.
+    one.push(30.0, 1.0, (10..=20).map(|k| at(f64::from(k))).collect());
+    assert_eq!(nearest_approach(&[one.clone(), other]), Some(5.0));
+    assert_eq!(nearest_approach(&[one, Track::default()]), None);
 }
