@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use criterion::Throughput;
-use paint_net::colour::{ColourFit, TexelSeparation};
+use paint_net::colour::{ColourFit, FootprintSet, TexelSeparation};
 use paint_net::painters::SurfaceFootprint;
 use paint_sim::colour::linear_srgb_lab;
 use paint_sim::paint::FilmStack;
@@ -38,12 +38,12 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let square: Vec<[f64; 3]> = (0..SIDE * SIDE).map(|k| colour(place(k, SIDE), [1.28, 1.28])).collect();
     let weight = vec![1.0; SIDE * SIDE];
-    let spots: Vec<SurfaceFootprint> = (0..SIDE * SIDE / 4).map(spot).collect();
+    let spots = FootprintSet::of((0..SIDE * SIDE / 4).map(spot))?;
     let fit = ColourFit {
         wanted: &square,
         weight: &weight,
         model: &model,
-        footprints: &[spots.as_slice(); 6],
+        footprints: &[&spots; 6],
         min_volume: 0.0,
         max_volume: 4.0,
         paint_weight: 0.3,

@@ -1,10 +1,12 @@
 //! Several paints: palettes, Kubelka-Munk mixtures, and images in colour.
 
+mod coarse_picture;
 mod colour_fit;
 mod colour_image;
 mod colour_metric;
 mod colour_problem;
 mod cost;
+mod footprint_set;
 mod kubelka_munk;
 mod mixing_model;
 mod mixture;
@@ -20,6 +22,7 @@ pub use colour_fit::ColourFit;
 pub use colour_image::ColourImage;
 pub use colour_metric::ColourMetric;
 pub use colour_problem::ColourProblem;
+pub use footprint_set::FootprintSet;
 pub use mixing_model::{MOST_PAINTS, MixingModel};
 pub use paint_choice::{best_order, choose_paints};
 pub use palette::{MAX_PAINTS, Paint, Palette};

@@ -1,7 +1,6 @@
 //! Doses of all paints of a picture for where the nozzle is planned to be: what one paint leaves wrong, another may mend.
 
-use paint_net::colour::ColourFit;
-use paint_net::painters::SurfaceFootprint;
+use paint_net::colour::{ColourFit, FootprintSet};
 use paint_planner::{Plan, Target};
 use paint_sim::Film;
 
@@ -35,10 +34,8 @@ pub(super) fn correct_colours(
         let parts: Vec<(&mut [Target], &Plan)> =
             flights.iter_mut().map(|f| (f.route.targets.as_mut_slice(), &f.plan)).collect();
         let sprayed = sprayed(&parts);
-        let of_paint: Vec<SurfaceFootprint> = shares(&parts, &sprayed, &film, task)?
-            .iter()
-            .map(|of_target| of_target.iter().map(depth).collect())
-            .collect();
+        let of_paint = shares(&parts, &sprayed, &film, task)?;
+        let of_paint = FootprintSet::of(of_paint.iter().map(|of_target| of_target.iter().map(depth).collect()))?;
         volumes.push(sprayed.iter().map(|&(f, k, length)| parts[f].0[k].dose * length / unit).collect::<Vec<f64>>());
         footprints.push(of_paint);
         all_sprayed.push(sprayed);
@@ -48,7 +45,7 @@ pub(super) fn correct_colours(
         wanted: &picture.aims(),
         weight: &weights(task, picture),
         model: &model,
-        footprints: &footprints.iter().map(Vec::as_slice).collect::<Vec<_>>(),
+        footprints: &footprints.iter().collect::<Vec<_>>(),
         min_volume: LEAST_VOLUME,
         max_volume: settings.limits.max_volume,
         paint_weight: PAINT_WEIGHT,

@@ -1,7 +1,8 @@
 //! Rows of sprays for the paints of a picture.
 
+use paint_net::colour::FootprintSet;
 use paint_net::model::{MonotoneCurve, Saturation};
-use paint_net::painters::{AdaptiveRows, SurfaceFootprint};
+use paint_net::painters::AdaptiveRows;
 use paint_net::path::{Stroke, StrokeSettings, in_order};
 use paint_net::{Image, PaintProblem, Spray};
 use paint_sim::Substrate;
@@ -21,6 +22,8 @@ const TOLERANCE: f64 = 0.2;
 const DARK: f64 = 0.05;
 /// Knots of the curve of what a depth looks like.
 const KNOTS: u32 = 64;
+/// Rows whose footprints are found at a time.
+const ROWS: usize = 16;
 /// Turn at which a row ends and another begins, radians.
 const BESIDE: f64 = 0.1;
 
@@ -28,7 +31,7 @@ const BESIDE: f64 = 0.1;
 pub(super) struct PaintRows {
     rows: Vec<Stroke>,
     /// What a unit of each spray leaves on the texels of the film.
-    pub(super) footprints: Vec<SurfaceFootprint>,
+    pub(super) footprints: FootprintSet,
     /// Whether the rows are flown as they are, or anew by what is left of their sprays.
     own_strokes: bool,
 }
@@ -69,10 +72,14 @@ impl PaintRows {
 }
 
 /// What sprays leave on the texels of the film.
-fn on_texels(task: &PaintingTask, rows: &[Stroke]) -> Result<Vec<SurfaceFootprint>, MissionError> {
+fn on_texels(task: &PaintingTask, rows: &[Stroke]) -> Result<FootprintSet, MissionError> {
     let footprints = Footprints::new(&task.surface, &task.settings)?;
-    let found = footprints.on_texels(rows);
-    footprints.checked(Ok(found))
+    let mut set = FootprintSet::default();
+    // Some at a time: as lists they take many times the room.
+    for rows in rows.chunks(ROWS) {
+        footprints.on_texels(rows).into_iter().try_for_each(|footprint| set.push(footprint))?;
+    }
+    footprints.checked(Ok(set))
 }
 
 /// The cells over which the nozzle may spray, as runs along the rows.

@@ -1,9 +1,9 @@
 //! What to spray of each paint of a picture: all of them at once.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use paint_net::colour::{ColourFit, SparseColourFit};
-use paint_net::painters::SurfaceFootprint;
+use paint_net::colour::{ColourFit, FootprintSet, SparseColourFit};
 use paint_net::path::Stroke;
 use paint_net::{Painting, Spray};
 
@@ -22,6 +22,8 @@ pub(super) const LEAST_VOLUME: f64 = 0.0025;
 const WAY_PRICE: f64 = 1.0;
 /// Edge of the blocks in which a paint is kept or left out, pixels.
 const BLOCK: f64 = 16.0;
+/// Texels on an edge of what is one texel until it is known which paint lies where.
+const COARSE: usize = 2;
 const ITERATIONS: usize = 80;
 const TOLERANCE: f64 = 3e-4;
 
@@ -49,7 +51,7 @@ pub(super) fn decide_colours(task: &PaintingTask, picture: &mut PictureTask) -> 
         wanted: &picture.aims(),
         weight: &weights(task, picture),
         model: &model,
-        footprints: &rows.iter().map(|rows| rows.footprints.as_slice()).collect::<Vec<_>>(),
+        footprints: &rows.iter().map(|rows| &rows.footprints).collect::<Vec<_>>(),
         min_volume: 0.0,
         max_volume: settings.limits.max_volume,
         paint_weight: PAINT_WEIGHT,
@@ -59,7 +61,8 @@ pub(super) fn decide_colours(task: &PaintingTask, picture: &mut PictureTask) -> 
         threads: settings.threads,
     };
     let strokes: Vec<&[Stroke]> = rows.iter().map(|rows| rows.rows()).collect();
-    let sparse = SparseColourFit { fit, rows: &strokes, block: BLOCK, price: WAY_PRICE };
+    let coarse = coarse_texels(task, picture);
+    let sparse = SparseColourFit { fit, rows: &strokes, block: BLOCK, price: WAY_PRICE, coarse: &coarse };
     let depths = sparse.solve(&mut volumes, &mut |share| stage.share(0.3 + 0.7 * share))?;
     let optimum = looks(picture, &depths);
     let blank = task.coverage.map(|_| 0.0);
@@ -80,6 +83,17 @@ pub(super) fn decide_colours(task: &PaintingTask, picture: &mut PictureTask) -> 
     Ok(paintings)
 }
 
+/// Squares of [`COARSE`] by `COARSE` texels, in the order of their first texels.
+fn coarse_texels(task: &PaintingTask, picture: &PictureTask) -> Vec<u32> {
+    let width = task.surface.width();
+    let mut numbers: HashMap<[usize; 2], u32> = HashMap::new();
+    let square = |&pixel: &usize| {
+        let next = numbers.len() as u32;
+        *numbers.entry([pixel % width / COARSE, pixel / width / COARSE]).or_insert(next)
+    };
+    picture.pixels.iter().map(square).collect()
+}
+
 /// How much each texel matters.
 pub(super) fn weights(task: &PaintingTask, picture: &PictureTask) -> Vec<f64> {
     let canvas = task.canvas();
@@ -98,15 +112,15 @@ pub(super) fn looks(picture: &PictureTask, depths: &[Vec<f64>]) -> Vec<[f64; 3]>
 }
 
 /// For a start, the mean under each footprint of the depth that its texels would need by themselves.
-fn means(footprints: &[SurfaceFootprint], depths: &[f64], settings: &MissionSettings) -> Vec<f64> {
+fn means(footprints: &FootprintSet, depths: &[f64], settings: &MissionSettings) -> Vec<f64> {
     let sigma = settings.spot / settings.texel;
     let cell = (settings.limits.spray_spacing * settings.limits.row_spacing) as f64;
     let depth_per_volume = std::f64::consts::TAU * sigma * sigma / cell;
-    let mean = |footprint: &SurfaceFootprint| {
-        let (sum, mass) = footprint.iter().fold((0.0, 0.0), |(sum, mass), &(k, share)| {
-            (sum + f64::from(share) * depths[k as usize], mass + f64::from(share))
-        });
+    let mean = |spray: usize| {
+        let (sum, mass) = footprints
+            .iter(spray)
+            .fold((0.0, 0.0), |(sum, mass), (k, share)| (sum + f64::from(share) * depths[k], mass + f64::from(share)));
         if mass > 0.0 { sum / mass / depth_per_volume } else { 0.0 }
     };
-    footprints.iter().map(mean).collect()
+    (0..footprints.len()).map(mean).collect()
 }

@@ -1,12 +1,12 @@
 //! Volumes of the sprays of several paints for the footprints that they really have, all at once.
 
 use super::colour_metric::ciede2000_rows;
+use super::footprint_set::FootprintSet;
 use super::mixing_model::{MOST_PAINTS, MixingModel};
 use super::pixel_fit::{difference, dot, times};
 use super::texel_separation::in_parallel;
 use crate::error::{Error, require};
 use crate::optimise::{StoppingRule, minimise};
-use crate::painters::SurfaceFootprint;
 use crate::trace::span;
 
 /// Pixels whose costs are summed up in one piece: sums do not depend on the threads.
@@ -31,7 +31,7 @@ pub struct ColourFit<'a> {
     /// What films look like there.
     pub model: &'a dyn MixingModel,
     /// For each paint, one footprint for each spray.
-    pub footprints: &'a [&'a [SurfaceFootprint]],
+    pub footprints: &'a [&'a FootprintSet],
     /// What every spray has at least that leaves anything.
     pub min_volume: f64,
     /// What it has at most.
@@ -56,15 +56,13 @@ impl ColourFit<'_> {
     pub fn solve(&self, volumes: &mut [Vec<f64>], progress: &mut dyn FnMut(f64)) -> Result<Vec<Vec<f64>>, Error> {
         span!("fit_colours");
         self.check(volumes)?;
-        let used = |p: usize, k: usize, f: &SurfaceFootprint| {
-            !f.is_empty() && self.prices.get(p).is_none_or(|prices| prices[k].is_finite())
-        };
         let of_used = |value: f64| -> Vec<Vec<f64>> {
-            let paints = self.footprints.iter().enumerate();
-            let of_paint = |(p, footprints): (usize, &&[SurfaceFootprint])| {
-                footprints.iter().enumerate().map(|(k, f)| if used(p, k, f) { value } else { 0.0 }).collect()
+            let used = |p: usize, k: usize| {
+                !self.footprints[p].leaves_nothing(k) && self.prices.get(p).is_none_or(|prices| prices[k].is_finite())
             };
-            paints.map(of_paint).collect()
+            let of_paint =
+                |p: usize| (0..self.footprints[p].len()).map(|k| if used(p, k) { value } else { 0.0 }).collect();
+            (0..self.footprints.len()).map(of_paint).collect()
         };
         let least = of_used(self.min_volume);
         let room = of_used(self.max_volume - self.min_volume);
@@ -89,7 +87,7 @@ impl ColourFit<'_> {
             }
         }
         planes.deposit(volumes);
-        Ok(planes.depths)
+        Ok(planes.depths.into_iter().map(|plane| plane.into_iter().map(f64::from).collect()).collect())
     }
 
     fn check(&self, volumes: &[Vec<f64>]) -> Result<(), Error> {
@@ -110,11 +108,8 @@ impl ColourFit<'_> {
         if let Some((what, found, expected)) = sizes.into_iter().find(|(_, found, expected)| found != expected) {
             return Err(Error::Mismatch { what, found: (found, 1), expected: (expected, 1) });
         }
-        for &(k, depth) in self.footprints.iter().flat_map(|of_paint| of_paint.iter().flatten()) {
-            if k as usize >= pixels || !(depth >= 0.0 && depth.is_finite()) {
-                let range = "pixels of the picture and a depth of 0 or more";
-                return Err(Error::Pixel { what: "footprint", x: k as usize, y: 0, value: f64::from(depth), range });
-            }
+        if let Some(beside) = self.footprints.iter().map(|of_paint| of_paint.pixels()).find(|found| *found > pixels) {
+            return Err(Error::Mismatch { what: "pixels under footprints", found: (beside, 1), expected: (pixels, 1) });
         }
         let least = self.prices.iter().flatten().copied().find(|price| price.is_nan() || *price < 0.0).unwrap_or(0.0);
         require("prices", least, least >= 0.0, "they must be 0 or more")?;
@@ -132,12 +127,20 @@ struct Pixel {
     rows: [[f64; 3]; 3],
 }
 
-/// Depths of all paints on all pixels, then what pulls at them.
+/// CIELAB of a pixel, and the depths of all paints there together.
+struct Look {
+    lab: [f64; 3],
+    paint: f64,
+}
+
+/// Depths of all paints on all pixels, then what pulls at them, in single precision as the model of the colours.
 struct Planes<'a> {
     fit: &'a ColourFit<'a>,
     counted: Vec<Pixel>,
     least: Vec<Vec<f64>>,
-    depths: Vec<Vec<f64>>,
+    depths: Vec<Vec<f32>>,
+    /// What pulls at the depths; 0 on pixels that do not count.
+    pulls: Vec<Vec<f32>>,
 }
 
 impl<'a> Planes<'a> {
@@ -145,7 +148,7 @@ impl<'a> Planes<'a> {
         let counted = (0..fit.wanted.len()).filter(|&k| fit.weight[k] > 0.0);
         let pixel = |k: usize| Pixel { k, rows: ciede2000_rows(fit.wanted[k]) };
         let depths = vec![vec![0.0; fit.wanted.len()]; fit.footprints.len()];
-        Self { fit, counted: counted.map(pixel).collect(), least, depths }
+        Self { fit, counted: counted.map(pixel).collect(), least, pulls: depths.clone(), depths }
     }
 
     fn deposit(&mut self, volumes: &[Vec<f64>]) {
@@ -153,10 +156,8 @@ impl<'a> Planes<'a> {
         let pixels = self.fit.wanted.len();
         let plane = |&p: &usize| {
             let mut plane = vec![0.0; pixels];
-            for (footprint, volume) in self.fit.footprints[p].iter().zip(&volumes[p]).filter(|(_, v)| **v > 0.0) {
-                for &(k, depth) in footprint {
-                    plane[k as usize] += volume * f64::from(depth);
-                }
+            for (k, &volume) in volumes[p].iter().enumerate().filter(|(_, volume)| **volume > 0.0) {
+                self.fit.footprints[p].deposit(k, volume, &mut plane);
             }
             plane
         };
@@ -168,38 +169,46 @@ impl<'a> Planes<'a> {
         let full: Vec<Vec<f64>> =
             start.iter().zip(&self.least).map(|(v, l)| v.iter().zip(l).map(|(v, l)| v + l).collect()).collect();
         self.deposit(&full);
-        let n = self.depths.len();
-        let curvature = |pixel: &Pixel| {
-            let (_, slopes) = self.look(pixel.k);
-            let of = |p: usize| times(&pixel.rows, slopes[p]).iter().map(|v| v * v).sum::<f64>();
-            (
-                pixel.k,
-                std::array::from_fn::<f64, MOST_PAINTS, _>(
-                    |p| if p < n { self.fit.weight[pixel.k] * of(p) } else { 0.0 },
-                ),
-            )
-        };
-        let found = in_parallel(&self.counted, self.fit.threads, &curvature);
-        let mut fields = vec![vec![0.0; self.fit.wanted.len()]; n];
-        for (k, of_paints) in found {
-            fields.iter_mut().zip(of_paints).for_each(|(field, value)| field[k] = value);
-        }
+        self.on_each_pixel(&|weight, pixel, _, slopes, out| {
+            for (out, slope) in out.iter_mut().zip(slopes) {
+                let slope = times(&pixel.rows, *slope);
+                *out = (weight * dot(slope, slope)) as f32;
+            }
+            0.0
+        });
         let mut units = Vec::new();
-        for (field, footprints) in fields.iter().zip(self.fit.footprints) {
-            let of = |f: &SurfaceFootprint| f.iter().map(|&(k, g)| f64::from(g * g) * field[k as usize]).sum::<f64>();
-            let curvatures: Vec<f64> = footprints.iter().map(of).collect();
+        for (field, footprints) in self.pulls.iter().zip(self.fit.footprints) {
+            let of = |k: usize| footprints.iter(k).map(|(pixel, g)| f64::from(g * g * field[pixel])).sum::<f64>();
+            let curvatures: Vec<f64> = (0..footprints.len()).map(of).collect();
             let floor = FLOOR * curvatures.iter().sum::<f64>() / curvatures.len().max(1) as f64 + 1e-9;
             units.extend(curvatures.iter().map(|c| 1.0 / (c + floor).sqrt()));
         }
         units
     }
 
-    fn look(&self, k: usize) -> ([f64; 3], [[f64; 3]; MOST_PAINTS]) {
-        let n = self.depths.len();
-        let (mut depths, mut slopes) = ([0.0; MOST_PAINTS], [[0.0; 3]; MOST_PAINTS]);
-        depths.iter_mut().zip(&self.depths).for_each(|(depth, plane)| *depth = plane[k]);
-        let lab = self.fit.model.lab(k, &depths[..n], &mut slopes[..n]);
-        (lab, slopes)
+    /// Puts what `of` makes of the weight, colour and slopes of each pixel into `pulls`, paint after paint; the sum of what it returns.
+    fn on_each_pixel(&mut self, of: &(dyn Fn(f64, &Pixel, &Look, &[[f64; 3]], &mut [f32]) -> f64 + Sync)) -> f64 {
+        let (n, fit) = (self.depths.len(), self.fit);
+        let of_block = |block: &&[Pixel]| {
+            let (mut values, mut sum) = (vec![0.0; n * block.len()], 0.0);
+            let mut slopes = [[0.0; 3]; MOST_PAINTS];
+            for (pixel, values) in block.iter().zip(values.chunks_exact_mut(n)) {
+                let mut depths = [0.0; MOST_PAINTS];
+                depths.iter_mut().zip(&self.depths).for_each(|(depth, plane)| *depth = f64::from(plane[pixel.k]));
+                let lab = fit.model.lab(pixel.k, &depths[..n], &mut slopes[..n]);
+                let look = Look { lab, paint: depths[..n].iter().sum() };
+                sum += of(fit.weight[pixel.k], pixel, &look, &slopes[..n], values);
+            }
+            (values, sum)
+        };
+        let blocks: Vec<&[Pixel]> = self.counted.chunks(BLOCK).collect();
+        let found = in_parallel(&blocks, fit.threads, &of_block);
+        for (block, (values, _)) in blocks.iter().zip(&found) {
+            for (pixel, values) in block.iter().zip(values.chunks_exact(n)) {
+                self.pulls.iter_mut().zip(values).for_each(|(plane, value)| plane[pixel.k] = *value);
+            }
+        }
+        found.iter().map(|(_, sum)| sum).sum()
     }
 
     fn cost(&mut self, values: &[f64], unit: &[f64], gradient: &mut [f64]) -> f64 {
@@ -211,39 +220,23 @@ impl<'a> Planes<'a> {
         let mut next = volume;
         let volumes: Vec<Vec<f64>> = self.least.iter().map(|least| least.iter().map(&mut next).collect()).collect();
         self.deposit(&volumes);
-        let n = self.depths.len();
-        let ColourFit { wanted, weight, paint_weight, .. } = *self.fit;
-        let pull = |block: &&[Pixel]| {
-            let mut cost = 0.0;
-            let pulls = block.iter().map(|pixel| {
-                let (lab, slopes) = self.look(pixel.k);
-                let residual = times(&pixel.rows, difference(lab, wanted[pixel.k]));
-                let paint: f64 = self.depths.iter().map(|plane| plane[pixel.k]).sum();
-                cost += weight[pixel.k] * (0.5 * dot(residual, residual) + paint_weight * paint);
-                let pull = |p: usize| dot(times(&pixel.rows, slopes[p]), residual) + paint_weight;
-                std::array::from_fn::<f64, MOST_PAINTS, _>(|p| if p < n { weight[pixel.k] * pull(p) } else { 0.0 })
-            });
-            (pulls.collect::<Vec<_>>(), cost)
-        };
-        let blocks: Vec<&[Pixel]> = self.counted.chunks(BLOCK).collect();
-        let pulled = in_parallel(&blocks, self.fit.threads, &pull);
-        let colours: f64 = pulled.iter().map(|(_, cost)| cost).sum();
-        let mut fields = vec![vec![0.0; wanted.len()]; n];
-        for (block, (pulls, _)) in blocks.iter().zip(&pulled) {
-            for (pixel, pulls) in block.iter().zip(pulls) {
-                fields.iter_mut().zip(pulls).for_each(|(field, pull)| field[pixel.k] = *pull);
+        let ColourFit { wanted, paint_weight, footprints, prices, threads, .. } = *self.fit;
+        let colours = self.on_each_pixel(&|weight, pixel, look, slopes, out| {
+            let residual = times(&pixel.rows, difference(look.lab, wanted[pixel.k]));
+            for (out, slope) in out.iter_mut().zip(slopes) {
+                *out = (weight * (dot(times(&pixel.rows, *slope), residual) + paint_weight)) as f32;
             }
-        }
-        let paints: Vec<usize> = (0..n).collect();
-        let gathered = in_parallel(&paints, self.fit.threads, &|&p: &usize| {
-            let of = |f: &SurfaceFootprint| f.iter().map(|&(k, g)| f64::from(g) * fields[p][k as usize]).sum::<f64>();
-            self.fit.footprints[p].iter().map(of).collect::<Vec<f64>>()
+            weight * (0.5 * dot(residual, residual) + paint_weight * look.paint)
+        });
+        let paints: Vec<usize> = (0..self.pulls.len()).collect();
+        let gathered = in_parallel(&paints, threads, &|&p: &usize| {
+            (0..footprints[p].len()).map(|k| footprints[p].gather(k, &self.pulls[p])).collect::<Vec<f64>>()
         });
         for ((slot, pull), unit) in gradient.iter_mut().zip(gathered.into_iter().flatten()).zip(unit) {
             *slot = pull * unit;
         }
         let mut ways = 0.0;
-        for (k, price) in self.fit.prices.iter().flatten().enumerate().filter(|(_, price)| price.is_finite()) {
+        for (k, price) in prices.iter().flatten().enumerate().filter(|(_, price)| price.is_finite()) {
             ways += price * values[k] * unit[k];
             gradient[k] += price * unit[k];
         }

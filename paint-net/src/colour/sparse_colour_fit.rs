@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use super::coarse_picture::CoarsePicture;
 use super::colour_fit::ColourFit;
+use super::footprint_set::FootprintSet;
 use crate::error::{Error, require};
 use crate::model::Spray;
 use crate::path::Stroke;
@@ -35,6 +37,8 @@ pub struct SparseColourFit<'a> {
     pub block: f64,
     /// What a pixel of way costs beside half the square of a colour difference: `μ`. With 0, nothing is left out.
     pub price: f64,
+    /// For each pixel the coarse pixel that it belongs to, from 0: all fits but the last are made on those. Empty: on the pixels themselves.
+    pub coarse: &'a [u32],
 }
 
 impl SparseColourFit<'_> {
@@ -48,8 +52,15 @@ impl SparseColourFit<'_> {
         if self.price == 0.0 {
             return fit.solve(volumes, progress);
         }
+        let coarse = if self.coarse.is_empty() { None } else { Some(CoarsePicture::new(&fit, self.coarse)?) };
+        let model = coarse.as_ref().map(|coarse| coarse.model(fit.model));
+        let footprints = coarse.as_ref().map(CoarsePicture::footprints);
+        let rough = match (&coarse, &model, &footprints) {
+            (Some(coarse), Some(model), Some(footprints)) => coarse.fit(&fit, model, footprints),
+            _ => fit,
+        };
         let [first, share] = SHARES;
-        fit.solve(volumes, &mut |done| progress(first * done))?;
+        rough.solve(volumes, &mut |done| progress(first * done))?;
         let mut blocks: Vec<Blocks> =
             self.rows.iter().zip(self.fit.footprints).map(|(rows, f)| Blocks::new(rows, f, self.block)).collect();
         blocks.iter_mut().zip(&*volumes).for_each(|(blocks, volumes)| blocks.measure(volumes));
@@ -59,7 +70,7 @@ impl SparseColourFit<'_> {
             let prices: Vec<Vec<f64>> = blocks.iter().zip(&means).map(prices).collect();
             let from = first + round as f64 * share;
             let iterations = self.fit.iterations.div_ceil(3);
-            let priced = ColourFit { prices: &prices, iterations, ..self.fit };
+            let priced = ColourFit { prices: &prices, iterations, ..rough };
             priced.solve(volumes, &mut |done| progress(from + share * done))?;
             blocks.iter_mut().zip(&*volumes).for_each(|(blocks, volumes)| blocks.measure(volumes));
         }
@@ -93,7 +104,7 @@ struct Blocks {
 }
 
 impl Blocks {
-    fn new(rows: &[Stroke], footprints: &[Vec<(u32, f32)>], edge: f64) -> Self {
+    fn new(rows: &[Stroke], footprints: &FootprintSet, edge: f64) -> Self {
         let mut numbers: BTreeMap<[i64; 2], usize> = BTreeMap::new();
         let mut ways = Vec::new();
         let mut of_spray = Vec::with_capacity(footprints.len());
@@ -104,7 +115,7 @@ impl Blocks {
                 ways.len() - 1
             });
             ways[block] += way;
-            let whole = footprints[of_spray.len()].iter().map(|&(_, depth)| f64::from(depth)).sum();
+            let whole = footprints.iter(of_spray.len()).map(|(_, depth)| f64::from(depth)).sum();
             of_spray.push((block, whole));
         }
         Self { of_spray, amounts: vec![0.0; ways.len()], ways }
