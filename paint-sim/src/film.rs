@@ -9,6 +9,7 @@ use crate::trace::{event, span};
 
 mod ball_tree;
 mod deposit;
+mod deposit_each;
 pub mod inspection;
 mod mass_balance;
 mod texel;

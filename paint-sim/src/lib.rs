@@ -36,6 +36,12 @@
 //! |---|---|---|
 //! | VR paper, Section IV (form ours) | conical Gaussian spray, per area and volume | [`SprayModel::density`] |
 //! | the same as an ellipse off the axis (ours) | aspect, turn, yaw, pitch of the jet | [`SprayModel::density_from`] |
+//! | Stokes; Schiller and Naumann 1933; Rosin and Rammler 1933 | droplets of a spray in moving air | [`spray::air::DropletSettings::path`] |
+//! | moments of their landings (ours) | spot shifted, widened and thinned by the air | [`spray::air::drifted`], [`Film::deposit_each`] |
+//! | Morton, Taylor, Turner 1956; Taylor 1940 | air that a spray drags along, and what it takes past the wall | [`spray::air::Jet`] |
+//! | Froude; Albertson et al. 1950; Beltaos and Rajaratnam 1974 | wash of the rotors | [`spray::air::RotorWash`] |
+//! | orifice area law; Graco's readings of worn tips | flow and fan of a tip that wears | [`spray::TipWear`] |
+//! | delay and linear ramps (ours) | what a valve lets through of a flow | [`gantry_robot::ValveSettings::through`], [`flight::FlightLog::through_valve`] |
 //! | Levenberg 1944, Marquardt 1963; derivatives and doubts: ours | spray and valve from photographed bursts | [`spray::calibration`] |
 //! | handheld paper, Section V (ours) | paint per texel, exact mass balance | [`Film::deposit`], [`film::MassBalance`] |
 //! | handheld paper, Eqs. (1), (6), (7) | required density, score of a step | [`droplets`] |
@@ -49,6 +55,7 @@
 //! | Jakob and Hanika 2019 | reflectance of a colour | [`colour::spectrum_of_linear_srgb`] |
 //! | pictures before and after (ours) | fall-off of the lens, light of the scene, thickness of the film | [`film::inspection`] |
 //! | Bingham 1922, Huppert 1982 | paint that runs on a wall | [`film::wet`] |
+//! | Orchard 1962 | ripples that surface tension levels | [`film::wet::Levelling`], [`film::wet::WetPaint::levelling_time`] |
 //! | Maron and Pierce 1956, Washburn 1921 | paint that dries, ground that soaks it up | [`film::wet`] |
 //! | Kubelka 1948, its tangent written out (ours) | colours of a million films | [`paint::FilmColours`] |
 //! | a paint by name on a substrate, by thickness (ours) | table of colours, curve of ink | [`paint::Appearance`], [`paint::ink_curve`] |

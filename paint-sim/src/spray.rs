@@ -1,8 +1,10 @@
 //! The spray cone: how the paint of one shot spreads over directions.
 
+pub mod air;
 pub mod calibration;
 mod ellipse;
 mod slope_forms;
+mod wear;
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
@@ -10,6 +12,7 @@ use crate::error::{Error, check_positive, check_range};
 pub(crate) use ellipse::SlopeEllipse;
 use ellipse::{EllipticCone, left_of};
 pub(crate) use slope_forms::SlopeForms;
+pub use wear::TipWear;
 
 /// One quantum of paint in the mass balance: one femtolitre, in cubic metres.
 pub const QUANTUM: f64 = 1e-18;

@@ -13,9 +13,9 @@ use crate::surface::Surface;
 pub(super) const SHOTS_PER_BATCH: usize = 1024;
 
 /// Quanta that the shots emit in total.
-pub(super) fn count_quanta(shots: &[Shot]) -> Result<u64, Error> {
+pub(super) fn count_quanta<'a>(shots: impl IntoIterator<Item = &'a Shot>) -> Result<u64, Error> {
     let mut emitted = 0_u64;
-    for (index, shot) in shots.iter().enumerate() {
+    for (index, shot) in shots.into_iter().enumerate() {
         if !(shot.origin.iter().chain(shot.axis.iter()).all(|v| v.is_finite()) && shot.volume.is_finite()) {
             return Err(Error::NotFinite { what: "shot", index });
         }
@@ -49,8 +49,25 @@ pub(super) fn deposit_batch(
     in_chunks(batch, threads, &work)
 }
 
+/// The same of shots with sprays of their own.
+pub(super) fn deposit_batch_each(
+    texels: &TexelIndex,
+    batch: &[(Shot, SprayModel)],
+    surface: &dyn Surface,
+    threads: usize,
+) -> Vec<(u32, u64)> {
+    let work = |shots: &[(Shot, SprayModel)]| {
+        let mut scratch = Scratch::default();
+        for (shot, spray) in shots {
+            deposit_shot(texels, shot, spray, surface, &mut scratch);
+        }
+        scratch.hits
+    };
+    in_chunks(batch, threads, &work)
+}
+
 /// The results of `work` on parts of the shots, one for each thread, joined in their order.
-fn in_chunks<T: Send>(shots: &[Shot], threads: usize, work: &(dyn Fn(&[Shot]) -> Vec<T> + Sync)) -> Vec<T> {
+fn in_chunks<S: Sync, T: Send>(shots: &[S], threads: usize, work: &(dyn Fn(&[S]) -> Vec<T> + Sync)) -> Vec<T> {
     if threads == 1 || shots.len() < 2 {
         return work(shots);
     }

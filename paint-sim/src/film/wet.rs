@@ -7,6 +7,7 @@
 mod descents;
 mod flow;
 mod ground;
+mod levelling;
 mod liquid_balance;
 mod wet_paint;
 mod wet_state;
@@ -14,6 +15,7 @@ mod wet_state;
 pub use descents::Side;
 pub use flow::Flow;
 pub use ground::Ground;
+pub use levelling::Levelling;
 pub use liquid_balance::LiquidBalance;
 pub use wet_paint::WetPaint;
 
@@ -73,14 +75,22 @@ impl WetFilm {
         threads: usize,
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<MassBalance, Error> {
-        self.0.fastest = None;
-        let WetState { film, paint, solvent, balance, .. } = &mut self.0;
-        let landed = &mut |texel: u32, solids: u64| {
-            let with = paint.solvent_of(solids);
-            solvent[texel as usize] += with;
-            balance.landed += with;
-        };
-        film.deposit_told(shots, spray, surface, threads, landed, progress)
+        let (film, mut landed) = self.0.filled();
+        film.deposit_told(shots, spray, surface, threads, &mut landed, progress)
+    }
+
+    /// The same of shots with sprays of their own; see [`Film::deposit_each`].
+    ///
+    /// # Errors
+    /// As [`Film::deposit`]; the film is then unchanged.
+    pub fn deposit_each(
+        &mut self,
+        shots: &[(Shot, SprayModel)],
+        surface: &dyn Surface,
+        threads: usize,
+    ) -> Result<MassBalance, Error> {
+        let (film, mut landed) = self.0.filled();
+        film.deposit_each_told(shots, surface, threads, &mut landed)
     }
 
     /// Lets `seconds` pass.

@@ -4,6 +4,8 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 
 use super::sample::FlightSample;
 use super::statistics::FlightStatistics;
+use crate::error::Error;
+use crate::gantry_robot::ValveSettings;
 use crate::spray::Shot;
 
 /// A simulated flight.
@@ -42,6 +44,24 @@ impl FlightLog {
         }
         shots.extend(accumulated.shot());
         shots
+    }
+
+    /// The log of what a valve lets through of its flows, as [`ValveSettings::through`] has it: [`shots`](Self::shots) then begin and end where
+    /// paint does, with a weak beginning and end. What flows after the log leaves the nozzle where the log ends. The flight's own
+    /// [`dead_time`](super::Valve::dead_time) is in its flows already.
+    ///
+    /// # Errors
+    /// Settings that are negative or not finite.
+    pub fn through_valve(&self, settings: &ValveSettings) -> Result<Self, Error> {
+        let commanded: Vec<f64> = self.samples.iter().map(|sample| sample.flow).collect();
+        let Some(last) = self.samples.len().checked_sub(1) else { return Ok(self.clone()) };
+        let flows = settings.through(&commanded, self.interval)?;
+        let mut samples = self.samples.clone();
+        for (k, flow) in flows.into_iter().enumerate() {
+            let sample = &mut samples[k.min(last)];
+            sample.flow = if k > last { sample.flow } else { 0.0 } + flow;
+        }
+        Ok(Self { samples, interval: self.interval })
     }
 
     /// Samples `step` seconds apart, the first among them; as near to that as the interval allows.
@@ -96,8 +116,7 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn a_thinned_log_keeps_its_times() {
+    fn log(flow: impl Fn(u32) -> f64) -> FlightLog {
         let sample = |k: u32| FlightSample {
             time: 0.01 * f64::from(k),
             world_from_body: Isometry3::identity(),
@@ -114,10 +133,41 @@ mod tests {
             hit: None,
             distance: 0.1,
             wanted_distance: 0.1,
-            flow: 1.0,
+            flow: flow(k),
             held: false,
         };
-        let log = FlightLog { samples: (0..102).map(sample).collect(), interval: 0.01 };
+        FlightLog { samples: (0..102).map(sample).collect(), interval: 0.01 }
+    }
+
+    /// Samples stand 10 ms apart and move 1 mm each: a burst comes late, ramped, and whole.
+    #[test]
+    fn paint_comes_when_the_valve_lets_it() {
+        let mut log = log(|k| if (20..60).contains(&k) || k > 90 { 2e-6 } else { 0.0 });
+        for (k, sample) in log.samples.iter_mut().enumerate() {
+            sample.nozzle.x = 1e-3 * k as f64;
+        }
+        let valve = ValveSettings { open_delay: 0.03, close_delay: 0.02, rise: 0.04, fall: 0.06 };
+        let passed = log.through_valve(&valve).unwrap();
+        let total = |log: &FlightLog| log.samples.iter().map(|s| s.flow).sum::<f64>() * 0.01;
+        // Two bursts, each 2e-6 (T - 10 ms + 10 ms): as much as was commanded.
+        assert!((total(&passed) / total(&log) - 1.0).abs() < 1e-12, "{} {}", total(&passed), total(&log));
+        let flows: Vec<f64> = passed.samples.iter().map(|s| s.flow * 1e6).collect();
+        for (k, flow) in
+            [(22, 0.0), (23, 0.25), (24, 0.75), (26, 1.75), (27, 2.0), (61, 2.0), (62, 2.0 - 1.0 / 6.0), (68, 0.0)]
+        {
+            assert!((flows[k] - flow).abs() < 1e-9, "{k}: {}", flows[k]);
+        }
+        let volumes = |log: &FlightLog| log.shots(2e-3).iter().map(|shot| shot.volume).sum::<f64>();
+        assert!((volumes(&passed) / total(&log) - 1.0).abs() < 1e-12);
+        // A valve that is at once where it is told to be changes nothing.
+        let ideal = ValveSettings { open_delay: 0.0, close_delay: 0.0, ..ValveSettings::default() };
+        assert_eq!(log.through_valve(&ideal).unwrap(), log);
+        assert!(log.through_valve(&ValveSettings { rise: -1.0, ..ideal }).is_err());
+    }
+
+    #[test]
+    fn a_thinned_log_keeps_its_times() {
+        let log = log(|_| 1.0);
         let thin = log.thinned(0.05);
         assert!(thin.samples.len() == 21 && (thin.interval - 0.05).abs() < 1e-15);
         for (k, kept) in thin.samples.iter().enumerate() {

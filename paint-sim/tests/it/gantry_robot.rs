@@ -85,7 +85,8 @@ fn a_hand_retreats_between_two_places() {
 
 #[test]
 fn the_valve_answers_late() {
-    let mut valve = Valve::new(ValveSettings { open_delay: 4e-3, close_delay: 2e-3 }).unwrap();
+    let mut valve =
+        Valve::new(ValveSettings { open_delay: 4e-3, close_delay: 2e-3, ..ValveSettings::default() }).unwrap();
     valve.command(0.0, true);
     assert!((valve.open_share(0.0, 0.01) - 0.6).abs() < 1e-9);
     valve.command(0.01, false);
@@ -94,6 +95,48 @@ fn the_valve_answers_late() {
     valve.command(0.02, true);
     valve.command(0.021, false);
     assert_eq!((valve.open_share(0.02, 0.03), valve.switched), (0.0, 4));
+}
+
+/// The integral of the flow in closed form: of bursts that open it wholly, of one too short for that, and of one that is shut again before it has
+/// fallen.
+#[test]
+fn a_valve_ramps_and_passes_what_its_ramps_say() {
+    let settings = ValveSettings { open_delay: 7.3e-3, close_delay: 4.1e-3, rise: 12e-3, fall: 20e-3 };
+    for interval in [1e-3, 5e-3, 10e-3] {
+        for (commands, flow) in [(60, 2e-6), (8, 1e-6), (1, 1e-6)] {
+            let burst = f64::from(commands) * interval;
+            let passed: f64 =
+                settings.through(&vec![flow; commands as usize], interval).unwrap().iter().sum::<f64>() * interval;
+            // It opens for the burst, longer by the difference of the delays.
+            let opens = (burst + 4.1e-3 - 7.3e-3).max(0.0);
+            let peak = (opens / 12e-3).min(1.0);
+            let closed = flow * (opens * peak - 0.5 * peak * peak * 12e-3 + 0.5 * peak * peak * 20e-3);
+            let closed = if peak < 1.0 { flow * (0.5 * opens * peak + 0.5 * peak * peak * 20e-3) } else { closed };
+            assert!((passed - closed).abs() < 1e-9 * flow, "{interval} {commands}: {passed} {closed}");
+        }
+    }
+    // Half shut when it opens again: up from there.
+    let mut valve = Valve::new(ValveSettings { open_delay: 0.0, close_delay: 0.0, rise: 0.1, fall: 0.2 }).unwrap();
+    valve.command(0.0, true);
+    assert!((valve.open_share(0.0, 0.1) - 0.5).abs() < 1e-12 && (valve.open_share(0.1, 0.2) - 1.0).abs() < 1e-12);
+    valve.command(0.2, false);
+    assert!((valve.open_share(0.2, 0.3) - 0.75).abs() < 1e-12);
+    valve.command(0.3, true);
+    assert!((valve.open_share(0.3, 0.4) - 0.875).abs() < 1e-12 && valve.open_share(0.4, 0.5) == 1.0);
+}
+
+/// A new flow comes as late as an opening does; while it shuts it passes the last.
+#[test]
+fn a_flow_that_changes_comes_late_too() {
+    let settings = ValveSettings { open_delay: 0.025, close_delay: 0.025, rise: 0.0, fall: 0.02 };
+    let passed = settings.through(&[0.0, 4.0, 4.0, 1.0, 0.0, 0.0, 0.0], 0.01).unwrap();
+    // Open from 35 to 65 ms with the flow of 25 ms ago, then down from 1 in 20 ms.
+    let expected = [0.0, 0.0, 0.0, 2.0, 4.0, 2.5, 1.0 * 0.5 + 0.5 * 0.875, 0.5, 0.0625, 0.0];
+    for (k, expected) in expected.iter().enumerate() {
+        assert!((passed[k] - expected).abs() < 1e-12, "{k}: {passed:?}");
+    }
+    assert!(settings.through(&[f64::NAN], 0.01).is_err() && settings.through(&[1.0], 0.0).is_err());
+    assert!(settings.through(&[], 0.01).unwrap().iter().all(|flow| *flow == 0.0));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::deposit::far_plate;
 const QUANTUM: f64 = 1e-18;
 
 /// A plane wall of `across` columns and `down` rows of square texels, leaning back by `lean` from the vertical; rows from the top.
-fn wall(across: usize, down: usize, edge: f64, lean: f64) -> (Vec<Texel>, Vec<Side>) {
+pub(crate) fn wall(across: usize, down: usize, edge: f64, lean: f64) -> (Vec<Texel>, Vec<Side>) {
     let (sin, cos) = lean.sin_cos();
     let index = |column: usize, row: usize| (row * across + column) as u32;
     let (mut texels, mut sides) = (Vec::new(), Vec::new());
@@ -32,7 +32,7 @@ fn wall(across: usize, down: usize, edge: f64, lean: f64) -> (Vec<Texel>, Vec<Si
 }
 
 /// Puts a wet film of `thickness` onto texel `k` alone: one shot from so near that its spot stays on it.
-fn wet(film: &mut WetFilm, paint: &WetPaint, k: usize, thickness: f64) {
+pub(crate) fn wet(film: &mut WetFilm, paint: &WetPaint, k: usize, thickness: f64) {
     let texel = film.film().texels()[k];
     let origin = texel.point + texel.normal.into_inner() * texel.area.sqrt();
     let near = SprayModel { sigma: 0.14, ..SprayModel::default() };
@@ -320,6 +320,23 @@ fn what_makes_no_sense_is_refused_by_name() {
     let mut film = WetFilm::new(film, &sides, paint, ground).unwrap();
     assert!(matches!(film.step(f64::NAN), Err(Error::OutOfRange { .. })));
     assert!(matches!(film.step(-1.0), Err(Error::OutOfRange { .. })));
+}
+
+/// Shots with a spray each bring the can's solvent as shots with one do.
+#[test]
+fn shots_with_sprays_of_their_own_are_wet_too() {
+    let (texels, sides) = wall(9, 9, 2e-3, 0.0);
+    let film = WetFilm::new(Film::new(texels).unwrap(), &sides, WetPaint::default(), Ground::default()).unwrap();
+    let shot = Shot { origin: Point3::new(-0.05, 8e-3, -8e-3), axis: Vector3::x_axis(), volume: 2e-9 };
+    let spray = SprayModel::default();
+    let (mut one, mut each) = (film.clone(), film);
+    let balance = one.deposit(&[shot, shot], &spray, &far_plate(), 1, &mut |_, _| ()).unwrap();
+    assert_eq!(each.deposit_each(&[(shot, spray); 2], &far_plate(), 2).unwrap(), balance);
+    for film in [&mut one, &mut each] {
+        film.step(60.0).unwrap();
+    }
+    assert_eq!(one.film().volumes(), each.film().volumes());
+    assert!(one.liquid_balance() == each.liquid_balance() && one.liquid_balance().landed > 0);
 }
 
 /// A metre of paint does not hang the program, and says that it was held back.

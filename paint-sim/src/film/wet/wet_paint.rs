@@ -20,7 +20,7 @@ pub struct WetPaint {
     /// Yield stress in the can, Pa; zero for a Newtonian liquid. Default 3: a wet film of a quarter of a millimetre stays on a vertical wall
     /// (10 mils in the test of ASTM D4400).
     pub yield_stress: f64,
-    /// Surface tension, N/m: how large the bead of a lower edge grows before it drips. Default 0.03.
+    /// Surface tension, N/m: how large the bead of a lower edge grows before it drips, and what levels ripples. Default 0.03.
     pub surface_tension: f64,
     /// Solids in the can, share by volume. Default 0.35; with 1 there is nothing to dry, and the paint stays where it lands.
     pub solids: f64,

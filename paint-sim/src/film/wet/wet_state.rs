@@ -23,3 +23,17 @@ pub(super) struct WetState {
     /// The largest rate of a wave over a texel, 1/s, where nothing has come since.
     pub(super) fastest: Option<f64>,
 }
+
+impl WetState {
+    /// The film, and what is to be told of solids that land on it: the can's solvent comes with them.
+    pub(super) fn filled(&mut self) -> (&mut Film, impl FnMut(u32, u64)) {
+        self.fastest = None;
+        let Self { film, paint, solvent, balance, .. } = self;
+        let landed = |texel: u32, solids: u64| {
+            let with = paint.solvent_of(solids);
+            solvent[texel as usize] += with;
+            balance.landed += with;
+        };
+        (film, landed)
+    }
+}
