@@ -17,11 +17,13 @@ mod step;
 mod sweep;
 mod texel_surface;
 
+#[cfg(feature = "gpu")]
+pub use crate::gpu::GpuOptions;
 pub use coverage::{Coverage, CoverageFigures};
 pub use density::{DensityPlace, DensitySettings, Flux, density_map};
 pub use directions::Droplets;
 #[cfg(feature = "gpu")]
-pub use gpu::{GpuDensity, GpuHits, GpuOptions};
+pub use gpu::{GpuDensity, GpuHits};
 pub use path_simulation::{PathOutcome, PathSimulation, SimulatedSegment};
 pub use step::{DepositSettings, StepCast, StepHits, StepOutcome};
 pub use sweep::{GantryGeometry, Nozzle, Sweep};

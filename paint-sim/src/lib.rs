@@ -57,7 +57,7 @@
 //! | Bingham 1922, Huppert 1982 | paint that runs on a wall | [`film::wet`] |
 //! | Orchard 1962 | ripples that surface tension levels | [`film::wet::Levelling`], [`film::wet::WetPaint::levelling_time`] |
 //! | Maron and Pierce 1956, Washburn 1921 | paint that dries, ground that soaks it up | [`film::wet`] |
-//! | Kubelka 1948, its tangent written out (ours) | colours of a million films | [`paint::FilmColours`] |
+//! | Kubelka 1948, its tangent written out (ours) | colours of a million films, also over each other | [`paint::FilmColours`] |
 //! | a paint by name on a substrate, by thickness (ours) | table of colours, curve of ink | [`paint::Appearance`], [`paint::ink_curve`] |
 //! | Duncan 1940 | wet mixture `K = sum c K`, `S = sum c S` | [`Paint::mix`] |
 //! | Saunderson 1942 | the air above the paint | [`km::saunderson`] |
@@ -77,7 +77,7 @@
 //!
 //! | feature | brings |
 //! |---|---|
-//! | `gpu` | required paint of droplets on a GPU (wgpu) |
+//! | `gpu` | required paint of droplets and colours of films on a GPU (wgpu) |
 //! | `serde` | settings and results can be stored |
 //! | `tracing` | spans and events for subscribers of `tracing` |
 
@@ -87,6 +87,8 @@ mod error;
 pub mod film;
 pub mod flight;
 pub mod gantry_robot;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod km;
 mod least_squares;
 pub mod paint;

@@ -5,6 +5,8 @@ mod chart;
 mod drawdown;
 mod film_colours;
 mod film_stack;
+#[cfg(feature = "gpu")]
+mod gpu_film_colours;
 mod named;
 mod pigments;
 
@@ -13,6 +15,8 @@ pub use chart::{ChartFit, Patch};
 pub use drawdown::Drawdown;
 pub use film_colours::FilmColours;
 pub use film_stack::{Bands, FilmStack, MOST_FILMS};
+#[cfg(feature = "gpu")]
+pub use gpu_film_colours::GpuFilmColours;
 pub use named::PaintName;
 pub use pigments::{PIGMENTS, Pigment};
 

@@ -46,6 +46,12 @@ impl Srgb8Table {
         &TABLE
     }
 
+    /// Least component with each code.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn least(&self) -> impl Iterator<Item = f32> {
+        self.least.into_iter().take(256)
+    }
+
     /// The byte of a linear component, clipped.
     pub(crate) fn encode(&self, linear: f32) -> u8 {
         let linear = linear.clamp(0.0, 1.0);

@@ -2,10 +2,7 @@
 
 mod casts;
 mod density;
-mod device;
 mod hits;
-mod options;
 
 pub use density::GpuDensity;
 pub use hits::GpuHits;
-pub use options::GpuOptions;

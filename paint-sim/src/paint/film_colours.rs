@@ -18,9 +18,9 @@ const EXP2: [f32; 6] =
 /// A sum with it is rounded to a whole number, which stands in its last bits.
 const ROUNDING: f32 = 12_582_912.0;
 
-/// How films of one paint on one ground look, as many as there are.
+/// How films on one ground look, as many as there are: of one paint, or of several paints over each other, each dry before the next.
 ///
-/// The same as [`Paint::over`] and [`spectrum_linear_srgb`](crate::colour::spectrum_linear_srgb), within 3e-6 of linear sRGB and a step of
+/// The same as [`Paint::over`] and [`spectrum_linear_srgb`](crate::colour::spectrum_linear_srgb), within 2e-6 of linear sRGB and a step of
 /// its bytes, an order of magnitude faster.
 ///
 /// ```
@@ -35,49 +35,52 @@ const ROUNDING: f32 = 12_582_912.0;
 /// ```
 #[derive(Debug, Clone)]
 pub struct FilmColours {
-    bands: [Band; BANDS],
+    /// From the lowest film up.
+    pub(super) films: Vec<[Band; BANDS]>,
+    /// Reflectance of the ground, and its share in linear red, green and blue.
+    pub(super) grounds: [(f32, [f32; 3]); BANDS],
 }
 
-/// One band, as the formula needs it.
+/// One band of a paint, as the formula needs it.
 #[derive(Debug, Clone, Copy)]
-struct Band {
+pub(super) struct Band {
     /// `g = sqrt(K (K + 2 S))`, 1/m.
-    decay: f32,
+    pub(super) decay: f32,
     /// `-2 g / ln 2`.
-    exponent: f32,
-    ground: f32,
-    /// `S (1 - Rg) - K Rg`.
-    gained: f32,
-    /// `S (1 - Rg) + K`.
-    lost: f32,
-    /// Share of its reflectance in linear red, green and blue.
-    weights: [f32; 3],
+    pub(super) exponent: f32,
+    /// `K`, 1/m.
+    pub(super) absorption: f32,
+    /// `S`, 1/m.
+    pub(super) scattering: f32,
 }
 
 impl FilmColours {
     /// Of films of `paint` on `ground`.
     pub fn new(paint: &Paint, ground: &Substrate) -> Self {
-        let weights = linear_srgb_weights();
-        let bands = std::array::from_fn(|j| {
-            let (k, s, rg) = (paint.absorption()[j], paint.scattering()[j], ground.reflectance()[j]);
-            let decay = (k.sqrt() * (k + 2.0 * s).sqrt()) as f32;
-            let decay = decay.max(LEAST_ABSORPTION * (k + s) as f32).max(f32::EPSILON);
-            Band {
-                decay,
-                exponent: -2.0 * std::f32::consts::LOG2_E * decay,
-                ground: rg as f32,
-                gained: (s * (1.0 - rg) - k * rg) as f32,
-                lost: (s * (1.0 - rg) + k) as f32,
-                weights: weights[j].map(|weight| weight as f32),
-            }
-        });
-        Self { bands }
+        Self::stacked(std::slice::from_ref(paint), ground)
     }
 
-    /// Linear sRGB under D65 of films so thick, metres; not clipped. A thickness that is negative or not a number counts as none.
+    /// Of films of several paints over each other, from the lowest up.
+    pub fn stacked(paints: &[Paint], ground: &Substrate) -> Self {
+        let weights = linear_srgb_weights();
+        let band = |paint: &Paint, j: usize| {
+            let (k, s) = (paint.absorption()[j], paint.scattering()[j]);
+            let decay = (k.sqrt() * (k + 2.0 * s).sqrt()) as f32;
+            let decay = decay.max(LEAST_ABSORPTION * (k + s) as f32).max(f32::EPSILON);
+            let exponent = -2.0 * std::f32::consts::LOG2_E * decay;
+            Band { decay, exponent, absorption: k as f32, scattering: s as f32 }
+        };
+        Self {
+            films: paints.iter().map(|paint| std::array::from_fn(|j| band(paint, j))).collect(),
+            grounds: std::array::from_fn(|j| (ground.reflectance()[j] as f32, weights[j].map(|weight| weight as f32))),
+        }
+    }
+
+    /// Linear sRGB under D65 of films so thick, metres; not clipped. Of several paints: the films of the lowest everywhere, then those of the
+    /// next. A thickness that is negative or not a number counts as none.
     ///
     /// # Errors
-    /// Not as many colours as films.
+    /// Not as many thicknesses as colours, of every paint.
     pub fn linear_srgb(&self, thickness: &[f32], colours: &mut [[f32; 3]]) -> Result<(), Error> {
         self.each(thickness, colours, |linear| linear)
     }
@@ -85,67 +88,86 @@ impl FilmColours {
     /// The same as sRGB bytes, clipped.
     ///
     /// # Errors
-    /// Not as many colours as films.
+    /// Not as many thicknesses as colours, of every paint.
     pub fn srgb8(&self, thickness: &[f32], colours: &mut [[u8; 3]]) -> Result<(), Error> {
         let table = Srgb8Table::get();
         self.each(thickness, colours, |linear| linear.map(|c| table.encode(c)))
     }
 
     fn each<C>(&self, thickness: &[f32], colours: &mut [C], of: impl Fn([f32; 3]) -> C) -> Result<(), Error> {
-        if thickness.len() != colours.len() {
-            return Err(Error::WrongLength { what: "colours", expected: thickness.len(), found: colours.len() });
-        }
-        let linear = vectorised();
-        for (films, colours) in thickness.chunks(LANES).zip(colours.chunks_mut(LANES)) {
-            let mut lanes = [0.0; LANES];
-            lanes[..films.len()].copy_from_slice(films);
-            let [red, green, blue] = linear(&self.bands, &lanes);
+        self.check(thickness, colours.len())?;
+        let (linear, places) = (vectorised(), colours.len());
+        let mut lanes = vec![[0.0; LANES]; self.films.len()];
+        for (first, colours) in (0..).step_by(LANES).zip(colours.chunks_mut(LANES)) {
+            for (film, lanes) in lanes.iter_mut().enumerate() {
+                let at = film * places + first;
+                lanes[..colours.len()].copy_from_slice(&thickness[at..at + colours.len()]);
+            }
+            let [red, green, blue] = linear(self, &lanes);
             for (lane, colour) in colours.iter_mut().enumerate() {
                 *colour = of([red[lane], green[lane], blue[lane]]);
             }
         }
         Ok(())
     }
+
+    /// Whether there are as many thicknesses as colours, of every paint.
+    pub(super) fn check(&self, thickness: &[f32], colours: usize) -> Result<(), Error> {
+        let expected = colours * self.films.len();
+        if thickness.len() == expected {
+            return Ok(());
+        }
+        Err(Error::WrongLength { what: "thicknesses", expected, found: thickness.len() })
+    }
 }
 
-type Linear = fn(&[Band; BANDS], &[f32; LANES]) -> [[f32; LANES]; 3];
+type Linear = fn(&FilmColours, &[[f32; LANES]]) -> [[f32; LANES]; 3];
 
 /// The best version that this processor runs.
 fn vectorised() -> Linear {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
-        return |bands, films| unsafe { linear_avx2(bands, films) };
+        return |stack, thickness| unsafe { linear_avx2(stack, thickness) };
     }
     linear
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn linear_avx2(bands: &[Band; BANDS], films: &[f32; LANES]) -> [[f32; LANES]; 3] {
-    linear(bands, films)
+fn linear_avx2(stack: &FilmColours, thickness: &[[f32; LANES]]) -> [[f32; LANES]; 3] {
+    linear(stack, thickness)
 }
 
 /// Red, green and blue of films. With `e = exp(-2 g d)`:
-/// `R = (Rg g (1+e) + (1-e) (S (1-Rg) - K Rg)) / (g (1+e) + (1-e) (S (1-Rg) + K))`, Kubelka 1948 with its hyperbolic tangent written out;
-/// `1-e` is summed without cancellation.
+/// `R = (Rg (g (1+e) - (1-e) K) + (1-e) S (1-Rg)) / (g (1+e) + (1-e) K + (1-e) S (1-Rg))`, Kubelka 1948 with its hyperbolic tangent written
+/// out; `1-e` is summed without cancellation. What a film reflects is the ground of the next.
 #[inline(always)]
-fn linear(bands: &[Band; BANDS], films: &[f32; LANES]) -> [[f32; LANES]; 3] {
+fn linear(stack: &FilmColours, thickness: &[[f32; LANES]]) -> [[f32; LANES]; 3] {
     let mut colours = [[0.0; LANES]; 3];
-    for band in bands {
-        for lane in 0..LANES {
-            // `max` also takes what is not a number away.
-            let power = (films[lane].max(0.0) * band.exponent).max(-126.0);
-            let whole = power + ROUNDING;
-            let part = power - (whole - ROUNDING);
-            let scale = f32::from_bits((whole.to_bits() << 23).wrapping_add(1.0_f32.to_bits()));
-            let [c0, c1, c2, c3, c4, c5] = EXP2;
-            let rest = scale * (part * (c0 + part * (c1 + part * (c2 + part * (c3 + part * (c4 + part * c5))))));
-            let absorbed = (1.0 - scale) - rest;
-            let passed = band.decay * (1.0 + (scale + rest));
-            let reflectance = (band.ground * passed + absorbed * band.gained) / (passed + absorbed * band.lost);
-            for (colour, weight) in colours.iter_mut().zip(band.weights) {
-                colour[lane] += reflectance * weight;
+    for (j, (ground, weights)) in stack.grounds.iter().enumerate() {
+        let mut reflectance = [*ground; LANES];
+        for (film, thickness) in stack.films.iter().zip(thickness) {
+            let band = &film[j];
+            for lane in 0..LANES {
+                // `max` also takes what is not a number away.
+                let power = (thickness[lane].max(0.0) * band.exponent).max(-126.0);
+                let whole = power + ROUNDING;
+                let part = power - (whole - ROUNDING);
+                let scale = f32::from_bits((whole.to_bits() << 23).wrapping_add(1.0_f32.to_bits()));
+                let [c0, c1, c2, c3, c4, c5] = EXP2;
+                let rest = scale * (part * (c0 + part * (c1 + part * (c2 + part * (c3 + part * (c4 + part * c5))))));
+                let lost = (1.0 - scale) - rest;
+                let passed = band.decay * (1.0 + (scale + rest));
+                let absorbed = lost * band.absorption;
+                let scattered = lost * (band.scattering * (1.0 - reflectance[lane]));
+                reflectance[lane] =
+                    (reflectance[lane] * (passed - absorbed) + scattered) / (passed + absorbed + scattered);
+            }
+        }
+        for (colour, weight) in colours.iter_mut().zip(weights) {
+            for lane in 0..LANES {
+                colour[lane] += reflectance[lane] * weight;
             }
         }
     }
@@ -159,10 +181,11 @@ mod tests {
     /// What the processor's own vectors compute is what any computes.
     #[test]
     fn all_versions_give_the_same_bits() {
-        let films = FilmColours::new(&Paint::yellow(20e-6).unwrap(), &Substrate::grey(0.4).unwrap());
+        let paints = [Paint::yellow(20e-6).unwrap(), Paint::blue(20e-6).unwrap()];
+        let films = FilmColours::stacked(&paints, &Substrate::grey(0.4).unwrap());
         for round in 0_u8..40 {
             let thickness = std::array::from_fn(|lane| 1.7e-6 * f32::from(round) + 3e-7 * lane as f32);
-            let [plain, vector] = [linear, vectorised()].map(|version| version(&films.bands, &thickness));
+            let [plain, vector] = [linear, vectorised()].map(|version| version(&films, &[thickness; 2]));
             assert_eq!(plain.map(|c| c.map(f32::to_bits)), vector.map(|c| c.map(f32::to_bits)));
         }
     }

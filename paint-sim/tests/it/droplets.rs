@@ -321,7 +321,7 @@ fn paint_beside_the_surface_is_not_booked() {
 #[cfg(feature = "gpu")]
 #[test]
 fn the_gpu_gives_the_same_density() {
-    use paint_sim::droplets::{GpuDensity, GpuOptions};
+    use paint_sim::droplets::GpuDensity;
     let mut faces = wall_at(0.06);
     for _ in 0..3 {
         faces = faces.iter().flat_map(quartered).collect();
@@ -331,14 +331,7 @@ fn the_gpu_gives_the_same_density() {
         (0..SIDE * SIDE).map(|k| if (k / SIDE + k % SIDE) % 7 < 3 { 20e-6 } else { 0.0 }).collect();
     let coverage = Coverage::new(&wall, &thickness).unwrap();
     let droplets = Droplets::new(&spray(), 1024, 0).unwrap();
-    let gpu = match GpuDensity::new(&droplets, &GpuOptions { software: true, ..GpuOptions::default() }) {
-        Ok(gpu) => gpu,
-        Err(error) => {
-            assert!(std::env::var_os("PAINTCOPTER_REQUIRE_GPU").is_none_or(|v| v != "1"), "{error}");
-            eprintln!("skipped: {error}");
-            return;
-        }
-    };
+    let Some(gpu) = crate::gpu::available(GpuDensity::new(&droplets, &crate::gpu::options())) else { return };
     let place = |k: i32| {
         let turned =
             UnitQuaternion::from_scaled_axis(Vector3::new(0.1, 0.02 * f64::from(k % 9), 0.01 * f64::from(k % 5)));
@@ -364,7 +357,7 @@ fn the_gpu_gives_the_same_density() {
 #[cfg(feature = "gpu")]
 #[test]
 fn a_path_simulated_with_the_hits_of_a_gpu_is_that_of_the_processor() {
-    use paint_sim::droplets::{GpuHits, GpuOptions, StepCast};
+    use paint_sim::droplets::{GpuHits, StepCast};
     let mut faces = wall_at(0.06);
     for _ in 0..3 {
         faces = faces.iter().flat_map(quartered).collect();
@@ -375,16 +368,9 @@ fn a_path_simulated_with_the_hits_of_a_gpu_is_that_of_the_processor() {
     let coverage = Coverage::new(&wall, &thickness).unwrap();
     let (deposit, gantry) = (DepositSettings::default(), GantryGeometry::default());
     let sets = Droplets::sets(&spray(), deposit.droplets, 16).unwrap();
-    let options = GpuOptions { software: true, ..GpuOptions::default() };
+    let options = crate::gpu::options();
     assert!(matches!(GpuHits::new(&[], &options), Err(Error::Empty { .. })));
-    let gpu = match GpuHits::new(&sets, &options) {
-        Ok(gpu) => gpu,
-        Err(error) => {
-            assert!(std::env::var_os("PAINTCOPTER_REQUIRE_GPU").is_none_or(|v| v != "1"), "{error}");
-            eprintln!("skipped: {error}");
-            return;
-        }
-    };
+    let Some(gpu) = crate::gpu::available(GpuHits::new(&sets, &options)) else { return };
     let segment =
         |k: i32, to: f64| SimulatedSegment { key: [k, 0, 0], start: 0.1 * f64::from(k), duration: 0.1, from: 0.05, to };
     let path: Vec<_> = (0..20).map(|k| segment(k, if k % 3 == 0 { 0.055 } else { 0.045 })).collect();

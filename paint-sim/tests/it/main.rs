@@ -12,6 +12,8 @@ mod flight_scene;
 mod flight_statistics;
 mod gantry_robot;
 mod gloss;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod inspection;
 mod km;
 mod levelling;

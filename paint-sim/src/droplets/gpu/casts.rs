@@ -5,7 +5,7 @@ use super::super::cone::Cone;
 use super::super::directions::Droplets;
 use super::super::sweep::Nozzle;
 use super::super::texel_surface::TexelSurface;
-use super::device::{floats, words};
+use crate::gpu::{floats, words};
 
 /// What every program on droplets begins with: bindings, and how a droplet finds its texel.
 const CAST: &str = include_str!("cast.wgsl");

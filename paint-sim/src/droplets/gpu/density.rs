@@ -5,9 +5,8 @@ use super::super::density::{DensityPlace, Flux};
 use super::super::directions::Droplets;
 use super::super::texel_surface::TexelSurface;
 use super::casts::{Casts, settings, slopes, source};
-use super::device::{Device, MOST_GROUPS, floats};
-use super::options::GpuOptions;
 use crate::error::Error;
+use crate::gpu::{GpuOptions, Input, MOST_GROUPS, Program, floats};
 
 /// A GPU that knows the droplets of a density.
 ///
@@ -15,7 +14,7 @@ use crate::error::Error;
 /// mean: additions come in another order, and a device may contract products and sums, so that a droplet at an edge can meet the
 /// neighbouring face or texel.
 pub struct GpuDensity {
-    device: Device,
+    program: Program,
     droplets: Droplets,
     slopes: Vec<u8>,
 }
@@ -26,13 +25,13 @@ impl GpuDensity {
     /// # Errors
     /// [`Error::Gpu`]: there is none, or it refuses.
     pub fn new(droplets: &Droplets, options: &GpuOptions) -> Result<Self, Error> {
-        let device = Device::open(options, &source(include_str!("density.wgsl")), "density")?;
-        Ok(Self { device, droplets: droplets.clone(), slopes: slopes([droplets]) })
+        let program = Program::new(options, &source(include_str!("density.wgsl")), "density")?;
+        Ok(Self { program, droplets: droplets.clone(), slopes: slopes([droplets]) })
     }
 
     /// Name and driver of the adapter.
     pub fn name(&self) -> &str {
-        &self.device.name
+        self.program.adapter()
     }
 
     /// As [`density_map`](crate::droplets::density_map).
@@ -55,8 +54,9 @@ impl GpuDensity {
             }
             let uniform = settings(surface, &self.droplets, flux == Flux::PaperLiteral);
             let [candidates, places] = casts.buffers();
-            let inputs = [&self.slopes, &candidates, &places, &floats(coverage.deficit())];
-            let found = self.device.run(&uniform, &inputs, batch.len(), batch.len())?;
+            let deficit = floats(coverage.deficit());
+            let inputs = [&self.slopes, &candidates, &places, &deficit].map(|bytes| Input::Sent(bytes));
+            let found = self.program.run(&uniform, &inputs, batch.len(), batch.len())?;
             values.extend(found.into_iter().map(f32::from_bits));
         }
         Ok(values)

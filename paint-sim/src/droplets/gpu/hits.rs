@@ -4,16 +4,15 @@ use super::super::directions::Droplets;
 use super::super::step::{StepCast, StepHits};
 use super::super::texel_surface::TexelSurface;
 use super::casts::{Casts, settings, slopes, source};
-use super::device::{Device, MOST_GROUPS};
-use super::options::GpuOptions;
 use crate::error::Error;
+use crate::gpu::{GpuOptions, Input, Program};
 
 /// A GPU that knows the sets of droplets of a [`PathSimulation`](crate::droplets::PathSimulation).
 ///
 /// At most one droplet in a thousand lands on another texel than on the processor, because a device may contract products and sums. From
 /// the hits on everything is counted in whole femtolitres, so that equal hits give equal paths.
 pub struct GpuHits {
-    device: Device,
+    program: Program,
     sets: Vec<Droplets>,
     slopes: Vec<u8>,
 }
@@ -31,13 +30,13 @@ impl GpuHits {
             let (value, allowed) = (other.len() as f64, "the same for all sets");
             return Err(Error::OutOfRange { what: "size of a set of droplets", value, allowed });
         }
-        let device = Device::open(options, &source(include_str!("hits.wgsl")), "hits")?;
-        Ok(Self { device, sets: sets.to_vec(), slopes: slopes(sets) })
+        let program = Program::new(options, &source(include_str!("hits.wgsl")), "hits")?;
+        Ok(Self { program, sets: sets.to_vec(), slopes: slopes(sets) })
     }
 
     /// Name and driver of the adapter.
     pub fn name(&self) -> &str {
-        &self.device.name
+        self.program.adapter()
     }
 
     /// Hits of each step, in order.
@@ -52,14 +51,14 @@ impl GpuHits {
         }
         let uniform = settings(surface, &self.sets[0], false);
         let mut hits = Vec::with_capacity(steps.len());
-        for batch in steps.chunks(self.device.most_groups(droplets).min(MOST_GROUPS)) {
+        for batch in steps.chunks(self.program.most_groups(droplets)) {
             let mut casts = Casts::default();
             for step in batch {
                 casts.push(surface, &step.nozzle, &self.sets[step.set], 0, (step.set * droplets) as u32);
             }
             let [candidates, places] = casts.buffers();
-            let inputs = [&self.slopes, &candidates, &places];
-            let texels = self.device.run(&uniform, &inputs, batch.len(), batch.len() * droplets)?;
+            let inputs = [&self.slopes, &candidates, &places].map(|bytes| Input::Sent(bytes));
+            let texels = self.program.run(&uniform, &inputs, batch.len(), batch.len() * droplets)?;
             hits.extend(texels.chunks(droplets).map(|texels| {
                 let landed = texels.iter().copied().filter(|texel| *texel != u32::MAX);
                 StepHits::of_texels(landed.collect(), droplets)
