@@ -3,25 +3,36 @@
 use std::sync::Arc;
 
 use crate::error::{Error, check_positive, check_range};
+#[cfg(feature = "gpu")]
+use crate::gpu::GpuOptions;
 use crate::spray::{QUANTUM, Shot, SprayModel};
+#[cfg(feature = "gpu")]
+use crate::surface::GpuSurface;
 use crate::surface::Surface;
 use crate::trace::{event, span};
 
 mod ball_tree;
 mod deposit;
 mod deposit_each;
+#[cfg(feature = "gpu")]
+mod gpu_shares;
+#[cfg(feature = "gpu")]
+mod gpu_spray;
 pub mod inspection;
 mod mass_balance;
 mod texel;
 mod texel_index;
 mod texel_share;
+mod waiting;
 pub mod wet;
 
+#[cfg(feature = "gpu")]
+pub use gpu_spray::GpuSpray;
 pub use mass_balance::MassBalance;
 pub use texel::Texel;
 
 use ball_tree::BallTree;
-use deposit::{SHOTS_PER_BATCH, count_quanta, deposit_batch, shot_shares};
+use deposit::{HitList, SHOTS_PER_BATCH, count_quanta, deposit_batch, shot_shares};
 use texel::check_unit;
 use texel_index::TexelIndex;
 
@@ -142,13 +153,58 @@ impl Film {
         landed: &mut dyn FnMut(u32, u64),
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<MassBalance, Error> {
-        span!("deposit");
+        let index = Arc::clone(&self.index);
         let emitted = check_call(shots, spray, threads)?;
+        let hits = |batch: &[Shot]| deposit_batch(&index, batch, spray, surface, threads);
+        self.deposit_hits(shots, emitted, &hits, landed, progress)
+    }
+
+    /// Opens an adapter, and puts the texels of this film there: for it and all its [layers](Film::layer).
+    ///
+    /// # Errors
+    /// [`Error::Gpu`]: there is none, it refuses, or it cannot hold the texels.
+    #[cfg(feature = "gpu")]
+    pub fn gpu_spray<'a>(&self, surface: &'a GpuSurface<'a>, options: &GpuOptions) -> Result<GpuSpray<'a>, Error> {
+        GpuSpray::new(&self.index, surface, options)
+    }
+
+    /// [`Film::deposit`] with the GPU that knows this film's texels, on the surface that it knows: the same paint on every texel, to the
+    /// femtolitre, and the same mass balance. Where the GPU fails the processor goes on with `threads`; [`GpuSpray::fault`] tells.
+    ///
+    /// # Errors
+    /// As [`Film::deposit`], and [`Error::Gpu`] where the GPU knows the texels of another film.
+    #[cfg(feature = "gpu")]
+    pub fn deposit_on(
+        &mut self,
+        gpu: &GpuSpray,
+        shots: &[Shot],
+        spray: &SprayModel,
+        threads: usize,
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<MassBalance, Error> {
+        if !gpu.knows(&self.index) {
+            return Err(Error::Gpu { what: "it knows the texels of another film".into() });
+        }
+        let emitted = check_call(shots, spray, threads)?;
+        let hits = |batch: &[Shot]| gpu.deposit_batch(batch, spray, threads);
+        self.deposit_hits(shots, emitted, &hits, &mut |_, _| (), progress)
+    }
+
+    /// Books what `hits` says of every batch.
+    fn deposit_hits(
+        &mut self,
+        shots: &[Shot],
+        emitted: u64,
+        hits: &dyn Fn(&[Shot]) -> HitList,
+        landed: &mut dyn FnMut(u32, u64),
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<MassBalance, Error> {
+        span!("deposit");
         self.mass_balance.emitted.checked_add(emitted).ok_or(Error::MassOverflow)?;
 
         let mut deposited = 0;
         for (number, batch) in shots.chunks(SHOTS_PER_BATCH).enumerate() {
-            for (texel, quanta) in deposit_batch(&self.index, batch, spray, surface, threads) {
+            for (texel, quanta) in hits(batch) {
                 self.volumes[texel as usize] += quanta;
                 deposited += quanta;
                 landed(texel, quanta);

@@ -77,7 +77,7 @@
 //!
 //! | feature | brings |
 //! |---|---|
-//! | `gpu` | required paint of droplets and colours of films on a GPU (wgpu) |
+//! | `gpu` | required paint of droplets, colours of films, spray deposit and rays of pictures on a GPU (wgpu) |
 //! | `serde` | settings and results can be stored |
 //! | `tracing` | spans and events for subscribers of `tracing` |
 

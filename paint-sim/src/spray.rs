@@ -2,6 +2,8 @@
 
 pub mod air;
 pub mod calibration;
+#[cfg(feature = "gpu")]
+mod cone_numbers;
 mod ellipse;
 mod slope_forms;
 mod wear;
@@ -9,10 +11,14 @@ mod wear;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
 use crate::error::{Error, check_positive, check_range};
+#[cfg(feature = "gpu")]
+pub(crate) use cone_numbers::{CONE_NUMBERS, cone_numbers};
 pub(crate) use ellipse::SlopeEllipse;
 use ellipse::{EllipticCone, left_of};
 pub(crate) use slope_forms::SlopeForms;
 pub use wear::TipWear;
+#[cfg(feature = "gpu")]
+pub(crate) use slope_forms::{EXP, LEAST_EXPONENT, ROUNDING};
 
 /// One quantum of paint in the mass balance: one femtolitre, in cubic metres.
 pub const QUANTUM: f64 = 1e-18;

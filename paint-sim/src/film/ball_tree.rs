@@ -1,12 +1,14 @@
 //! A bounding-ball tree over the texels: which of them can one spray cone reach?
 
+use std::ops::Range;
+
 use nalgebra::{Point3, Vector3};
 
 use super::texel::Texel;
 use crate::spray::Cone;
 
 /// Texels per leaf: small enough that few outside the cone are looked at, large enough that the tree stays small.
-const LEAF: usize = 16;
+pub(super) const LEAF: usize = 16;
 
 /// Binary tree of balls over a permutation of the texels; the two children of a node follow one another.
 #[derive(Debug)]
@@ -50,6 +52,11 @@ impl BallTree {
 
     /// Calls `visit` with every texel that the cone may touch, in an order that depends on the texels alone.
     pub(super) fn for_each(&self, cone: &Cone, stack: &mut Vec<u32>, mut visit: impl FnMut(u32)) {
+        self.for_each_leaf(cone, stack, |leaf| self.order[leaf].iter().for_each(|&i| visit(i)));
+    }
+
+    /// The same, leaf by leaf: where its texels stand in the order.
+    pub(super) fn for_each_leaf(&self, cone: &Cone, stack: &mut Vec<u32>, mut visit: impl FnMut(Range<usize>)) {
         stack.clear();
         stack.push(0);
         while let Some(index) = stack.pop() {
@@ -58,11 +65,26 @@ impl BallTree {
                 continue;
             }
             if node.children == 0 {
-                self.order[node.start as usize..node.end as usize].iter().for_each(|&i| visit(i));
+                visit(node.start as usize..node.end as usize);
             } else {
                 stack.extend([node.children + 1, node.children]);
             }
         }
+    }
+
+    /// Where the texels of all leaves stand, from first to last.
+    #[cfg(feature = "gpu")]
+    pub(super) fn leaves(&self) -> Vec<Range<usize>> {
+        let leaves = self.nodes.iter().filter(|node| node.children == 0);
+        let mut leaves: Vec<_> = leaves.map(|node| node.start as usize..node.end as usize).collect();
+        leaves.sort_unstable_by_key(|leaf| leaf.start);
+        leaves
+    }
+
+    /// The texels, leaf after leaf.
+    #[cfg(feature = "gpu")]
+    pub(super) fn order(&self) -> &[u32] {
+        &self.order
     }
 }
 

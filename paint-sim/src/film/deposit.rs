@@ -4,7 +4,8 @@ use nalgebra::Vector3;
 
 use super::texel::check_unit;
 use super::texel_index::TexelIndex;
-use super::texel_share::{LANES, Points, vectorised};
+use super::texel_share::{Points, vectorised};
+use super::waiting::Waiting;
 use crate::error::{Error, check_not_negative};
 use crate::spray::{Cone, QUANTUM, Shot, SprayModel};
 use crate::surface::Surface;
@@ -27,18 +28,21 @@ pub(super) fn count_quanta<'a>(shots: impl IntoIterator<Item = &'a Shot>) -> Res
     if emitted == u64::MAX { Err(Error::MassOverflow) } else { Ok(emitted) }
 }
 
-fn quanta(volume: f64) -> u64 {
+pub(super) fn quanta(volume: f64) -> u64 {
     (volume / QUANTUM).round() as u64
 }
 
-/// The hit list of a batch: (texel, quanta). Integer sums do not depend on the order, so the threads need no other care.
+/// Texels and the quanta that come onto them.
+pub(super) type HitList = Vec<(u32, u64)>;
+
+/// The hit list of a batch. Integer sums do not depend on the order, so the threads need no other care.
 pub(super) fn deposit_batch(
     texels: &TexelIndex,
     batch: &[Shot],
     spray: &SprayModel,
     surface: &dyn Surface,
     threads: usize,
-) -> Vec<(u32, u64)> {
+) -> HitList {
     let work = |shots: &[Shot]| {
         let mut scratch = Scratch::default();
         for shot in shots {
@@ -83,11 +87,11 @@ fn in_chunks<S: Sync, T: Send>(shots: &[S], threads: usize, work: &(dyn Fn(&[S])
 
 /// Buffers that live as long as a thread's work, so that the loop over shots does not allocate.
 #[derive(Default)]
-struct Scratch {
+pub(super) struct Scratch {
     stack: Vec<u32>,
-    shares: Vec<(u32, f64)>,
+    pub(super) shares: Vec<(u32, f64)>,
     remainders: Vec<(f64, usize)>,
-    hits: Vec<(u32, u64)>,
+    pub(super) hits: HitList,
 }
 
 fn deposit_shot(texels: &TexelIndex, shot: &Shot, spray: &SprayModel, surface: &dyn Surface, scratch: &mut Scratch) {
@@ -124,7 +128,7 @@ pub(super) fn shot_shares(
 }
 
 /// Texels in the cone and out of the shadow, with the share of the paint that each claims.
-fn find_shares(
+pub(super) fn find_shares(
     texels: &TexelIndex,
     shot: &Shot,
     spray: &SprayModel,
@@ -141,20 +145,13 @@ fn find_shares(
         let found = lanes.iter().zip(texel_shares(&cone, &forms, &texels, points));
         shares.extend(found.filter(|(_, share)| *share > 0.0).map(|(index, share)| (*index, share)));
     };
-    let mut waiting = [Points::Two, Points::Three, Points::Pieces].map(|points| (points, [0; LANES], 0));
+    let mut waiting = Waiting::default();
     texels.tree.for_each(&cone, stack, |index| {
-        let Some(points) = Points::of(&cone, &texels.texels[index as usize]) else { return };
-        let (points, lanes, count) = &mut waiting[points as usize];
-        lanes[*count] = index;
-        *count += 1;
-        if *count == LANES {
-            claim(lanes, *points);
-            *count = 0;
+        if let Some(points) = Points::of(&cone, &texels.texels[index as usize]) {
+            waiting.push(index, points, &mut claim);
         }
     });
-    for (points, lanes, count) in waiting {
-        claim(&lanes[..count], points);
-    }
+    waiting.finish(&mut claim);
     remove_shadowed(texels, shot, spray, surface, shares);
 }
 
@@ -172,19 +169,30 @@ fn remove_shadowed(
     surface: &dyn Surface,
     shares: &mut Vec<(u32, f64)>,
 ) {
+    let (clearance, rays) = shadow_rays(texels, shot, spray, surface, shares);
+    let mut occluded = surface.occluded_beam(&shot.origin, clearance, &rays).into_iter();
+    shares.retain(|_| occluded.next() != Some(true));
+}
+
+/// How far around the nozzle there is nothing, and for every claim the ray that must be free: its direction, and its length from there on.
+pub(super) fn shadow_rays(
+    texels: &TexelIndex,
+    shot: &Shot,
+    spray: &SprayModel,
+    surface: &dyn Surface,
+    shares: &[(u32, f64)],
+) -> (f64, Vec<(Vector3<f64>, f64)>) {
     let clearance = surface.distance(&shot.origin, spray.range) * (1.0 - 1e-9);
     let to_texel = |(texel, _): &(u32, f64)| {
         let ray = texels.texels[*texel as usize].point - shot.origin;
         let distance = ray.norm();
         (ray / distance, distance - clearance - spray.shadow_bias)
     };
-    let rays: Vec<(Vector3<f64>, f64)> = shares.iter().map(to_texel).collect();
-    let mut occluded = surface.occluded_beam(&shot.origin, clearance, &rays).into_iter();
-    shares.retain(|_| occluded.next() != Some(true));
+    (clearance, shares.iter().map(to_texel).collect())
 }
 
 /// Largest remainder rounding of `shares * emitted`: whole quanta whose sum is the rounded sum.
-fn round_shot(emitted: u64, efficiency: f64, scratch: &mut Scratch) {
+pub(super) fn round_shot(emitted: u64, efficiency: f64, scratch: &mut Scratch) {
     let Scratch { shares, remainders, hits, .. } = scratch;
     let claimed: f64 = shares.iter().map(|(_, share)| share).sum();
     if claimed <= 0.0 {

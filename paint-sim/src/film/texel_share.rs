@@ -12,23 +12,23 @@ use super::texel::Texel;
 use crate::spray::{Cone, SlopeForms};
 
 /// Up to this size, in deviations of the spot, a texel is one sample.
-const SINGLE_SAMPLE_SIZE: f64 = 0.125;
+pub(super) const SINGLE_SAMPLE_SIZE: f64 = 0.125;
 
 /// Up to this size two by two Gauss points leave a relative error of about 5e-5 in the middle of the spot.
-const TWO_POINT_SIZE: f64 = 0.5;
+pub(super) const TWO_POINT_SIZE: f64 = 0.5;
 
 /// Up to this size three by three points leave less. Larger texels are cut into pieces of this size.
-const THREE_POINT_SIZE: f64 = 1.0;
+pub(super) const THREE_POINT_SIZE: f64 = 1.0;
 
 /// Most pieces per side of one texel.
-const MAX_PIECES_PER_SIDE: f64 = 8.0;
+pub(super) const MAX_PIECES_PER_SIDE: f64 = 8.0;
 
 /// Radius of a ball around all samples of a texel, in its sides: half a diagonal, and a little for rounding.
-const REACH: f64 = 0.75;
+pub(super) const REACH: f64 = 0.75;
 
 /// Gauss points on -1/2..1/2, and their weights.
-const TWO: [(f64, f64); 2] = [(-0.288_675_134_594_812_9, 0.5), (0.288_675_134_594_812_9, 0.5)];
-const THREE: [(f64, f64); 3] =
+pub(super) const TWO: [(f64, f64); 2] = [(-0.288_675_134_594_812_9, 0.5), (0.288_675_134_594_812_9, 0.5)];
+pub(super) const THREE: [(f64, f64); 3] =
     [(-0.387_298_334_620_741_7, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.387_298_334_620_741_7, 5.0 / 18.0)];
 
 /// Texels side by side, so that a loop over them becomes vector code.
@@ -45,6 +45,9 @@ pub(super) enum Points {
 }
 
 impl Points {
+    /// From the fewest points up.
+    pub(super) const ALL: [Self; 3] = [Self::Two, Self::Three, Self::Pieces];
+
     /// As the texel is large for the spot; `None` of one that catches nothing. What is not wholly before the nozzle is cut into pieces.
     pub(super) fn of(cone: &Cone, texel: &Texel) -> Option<Self> {
         let ray = texel.point - cone.origin;

@@ -170,9 +170,14 @@ impl Program {
         &self.device.name
     }
 
+    /// The most words of one buffer.
+    pub(crate) fn most_words(&self) -> usize {
+        (self.device.most_bytes / 4) as usize
+    }
+
     /// The most work groups of one run, each with so many words in the largest of its buffers; at least one.
     pub(crate) fn most_groups(&self, words: usize) -> usize {
-        ((self.device.most_bytes / (4 * words.max(1) as u64)) as usize).clamp(1, MOST_GROUPS)
+        (self.most_words() / words.max(1)).clamp(1, MOST_GROUPS)
     }
 
     /// Puts an input on the device for all programs of the same options.

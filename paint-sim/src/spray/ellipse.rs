@@ -88,6 +88,16 @@ impl EllipticCone {
         self.sides.each_ref().map(|side| side.center / side.deviation)
     }
 
+    /// Of each side: direction, centre, reach, and the lengths of the normals of both planes that bound it.
+    #[cfg(feature = "gpu")]
+    pub(super) fn sides(&self) -> [[f64; 7]; 2] {
+        self.sides.each_ref().map(|side| {
+            let [above, below] = [side.center + side.reach, side.center - side.reach].map(|slope| slope.hypot(1.0));
+            let direction = side.direction;
+            [direction.x, direction.y, direction.z, side.center, side.reach, above, below]
+        })
+    }
+
     /// Square of the distance from the middle in deviations, at a slope (ray over depth).
     pub(crate) fn squared(&self, slope: &Vector3<f64>) -> f64 {
         self.sides.iter().map(|side| ((slope.dot(&side.direction) - side.center) / side.deviation).powi(2)).sum()

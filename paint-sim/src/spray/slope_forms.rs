@@ -6,11 +6,12 @@ use std::array::from_fn;
 use nalgebra::Vector3;
 
 /// Coefficients of `exp`, by Taylor's series: within 3e-10 from `-ln(2)/2` to `ln(2)/2`.
-const EXP: [f64; 9] = [1.0, 1.0, 0.5, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0, 1.0 / 5040.0, 1.0 / 40320.0];
+pub(crate) const EXP: [f64; 9] =
+    [1.0, 1.0, 0.5, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0, 1.0 / 5040.0, 1.0 / 40320.0];
 /// A sum with it is rounded to a whole number, which stands in its last bits.
-const ROUNDING: f64 = 6_755_399_441_055_744.0;
+pub(crate) const ROUNDING: f64 = 6_755_399_441_055_744.0;
 /// Smaller exponents give nothing that counts, and no number that is normal.
-const LEAST_EXPONENT: f64 = -700.0;
+pub(crate) const LEAST_EXPONENT: f64 = -700.0;
 
 /// A spray's cone by the distances of a point along its axis and along both sides of its ellipse, these in deviations.
 pub(crate) struct SlopeForms {

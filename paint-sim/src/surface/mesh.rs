@@ -118,6 +118,20 @@ impl TriangleSurface {
         first.get()
     }
 
+    /// The hit of one triangle, by its place among those that have an area: what [`cast`](Surface::cast) returns where it is the first one.
+    #[cfg(feature = "gpu")]
+    pub(super) fn cast_at(&self, leaf: u32, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Hit> {
+        let (distance, weights) =
+            ShearedRay::new(origin, direction)?.intersect(self.corners.get(leaf as usize)?, max)?;
+        Some(self.hit((leaf, distance, weights)))
+    }
+
+    /// Corners of the triangles that have an area.
+    #[cfg(feature = "gpu")]
+    pub(super) fn corners(&self) -> &[[Vector3<f64>; 3]] {
+        &self.corners
+    }
+
     fn hit(&self, (leaf, distance, barycentric): Found) -> Hit {
         let normal = scaled_normal(&self.corners[leaf as usize]).normalize();
         Hit { distance, face: self.faces[leaf as usize], barycentric, normal }

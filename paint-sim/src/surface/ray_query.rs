@@ -15,6 +15,26 @@ pub struct Hit {
     pub normal: Vector3<f64>,
 }
 
+/// A stretch of a ray that something may lie on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShadowRay {
+    /// Where the ray begins, m.
+    pub origin: Point3<f64>,
+    /// Unit vector.
+    pub direction: Vector3<f64>,
+    /// Distance from the origin at which the stretch begins, m.
+    pub from: f64,
+    /// Length of the stretch, m; nothing lies on one that is not positive.
+    pub length: f64,
+}
+
+impl ShadowRay {
+    /// Where the stretch begins, m.
+    pub fn start(&self) -> Point3<f64> {
+        self.origin + self.direction * self.from
+    }
+}
+
 /// What this crate needs to know of a surface. All points and vectors are in the world frame, in metres.
 pub trait Surface: Sync {
     /// The first hit of the ray within `max` metres, from either side of the surface. `direction` has unit length.
@@ -45,6 +65,16 @@ pub trait Surface: Sync {
     /// answers must be those of each ray alone.
     fn occluded_parallel(&self, origins: &[Point3<f64>], direction: &Vector3<f64>, max: f64) -> Vec<bool> {
         origins.iter().map(|origin| self.occluded(origin, direction, max)).collect()
+    }
+
+    /// [`occluded`](Self::occluded) of any rays. Override it where many of them cost less together; the answers must be those of each ray alone.
+    fn occluded_each(&self, rays: &[ShadowRay]) -> Vec<bool> {
+        rays.iter().map(|ray| ray.length > 0.0 && self.occluded(&ray.start(), &ray.direction, ray.length)).collect()
+    }
+
+    /// How many neighbouring rays are best asked for at once: as many as share their search.
+    fn rays_at_once(&self) -> usize {
+        256
     }
 
     /// Distance from `point` to the closest point of the surface, at most `max` (also returned when it is farther), m.

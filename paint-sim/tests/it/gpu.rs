@@ -1,6 +1,8 @@
 //! What runs on a GPU against what the processor computes.
 
 mod film_colours;
+mod spray;
+mod surface;
 
 use paint_sim::Error;
 use paint_sim::gpu::GpuOptions;
