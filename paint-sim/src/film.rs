@@ -191,11 +191,11 @@ impl Film {
     }
 
     /// Books what `hits` says of every batch.
-    fn deposit_hits(
+    fn deposit_hits<S>(
         &mut self,
-        shots: &[Shot],
+        shots: &[S],
         emitted: u64,
-        hits: &dyn Fn(&[Shot]) -> HitList,
+        hits: &dyn Fn(&[S]) -> HitList,
         landed: &mut dyn FnMut(u32, u64),
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<MassBalance, Error> {

@@ -68,6 +68,9 @@ pub struct Frame {
 /// Each pixel's colour is the mean of `supersampling`^2 rays on a regular grid, each with shadow rays towards sun and lamps;
 /// depth, face and normal belong to the pixel's centre. The picture does not depend on `threads`.
 ///
+/// A `GpuSurface` of [`crate::surface`] (feature `gpu`) as the surface casts all rays on a GPU, those of shadows too, large parts of the
+/// picture at once; `shade` and the light stay on the processor. The picture is the same, to the last bit.
+///
 /// # Errors
 /// A camera or lights with numbers that are not finite, no pixels, `supersampling` outside 1..=16, no threads.
 pub fn render(

@@ -16,9 +16,9 @@ pub(crate) use cone_numbers::{CONE_NUMBERS, cone_numbers};
 pub(crate) use ellipse::SlopeEllipse;
 use ellipse::{EllipticCone, left_of};
 pub(crate) use slope_forms::SlopeForms;
-pub use wear::TipWear;
 #[cfg(feature = "gpu")]
 pub(crate) use slope_forms::{EXP, LEAST_EXPONENT, ROUNDING};
+pub use wear::TipWear;
 
 /// One quantum of paint in the mass balance: one femtolitre, in cubic metres.
 pub const QUANTUM: f64 = 1e-18;

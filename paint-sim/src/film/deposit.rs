@@ -43,27 +43,21 @@ pub(super) fn deposit_batch(
     surface: &dyn Surface,
     threads: usize,
 ) -> HitList {
-    let work = |shots: &[Shot]| {
-        let mut scratch = Scratch::default();
-        for shot in shots {
-            deposit_shot(texels, shot, spray, surface, &mut scratch);
-        }
-        scratch.hits
-    };
-    in_chunks(batch, threads, &work)
+    deposit_batch_each(texels, batch, &|shot| (*shot, *spray), surface, threads)
 }
 
-/// The same of shots with sprays of their own.
-pub(super) fn deposit_batch_each(
+/// The same of anything that is a shot with a spray of its own.
+pub(super) fn deposit_batch_each<S: Sync>(
     texels: &TexelIndex,
-    batch: &[(Shot, SprayModel)],
+    batch: &[S],
+    shot: &(dyn Fn(&S) -> (Shot, SprayModel) + Sync),
     surface: &dyn Surface,
     threads: usize,
-) -> Vec<(u32, u64)> {
-    let work = |shots: &[(Shot, SprayModel)]| {
+) -> HitList {
+    let work = |shots: &[S]| {
         let mut scratch = Scratch::default();
-        for (shot, spray) in shots {
-            deposit_shot(texels, shot, spray, surface, &mut scratch);
+        for (shot, spray) in shots.iter().map(shot) {
+            deposit_shot(texels, &shot, &spray, surface, &mut scratch);
         }
         scratch.hits
     };

@@ -1,6 +1,8 @@
 //! Shots with sprays of their own, as moving air leaves them.
 
-use super::deposit::{SHOTS_PER_BATCH, count_quanta, deposit_batch_each};
+use std::sync::Arc;
+
+use super::deposit::{count_quanta, deposit_batch_each};
 use super::{Film, MassBalance};
 use crate::error::{Error, check_range};
 use crate::spray::{Shot, SprayModel};
@@ -32,19 +34,8 @@ impl Film {
         shots.iter().try_for_each(|(_, spray)| spray.check())?;
         check_range("threads", threads as f64, 1.0, 1024.0, "between 1 and 1024")?;
         let emitted = count_quanta(shots.iter().map(|(shot, _)| shot))?;
-        self.mass_balance.emitted.checked_add(emitted).ok_or(Error::MassOverflow)?;
-        let mut deposited = 0;
-        for batch in shots.chunks(SHOTS_PER_BATCH) {
-            for (texel, quanta) in deposit_batch_each(&self.index, batch, surface, threads) {
-                self.volumes[texel as usize] += quanta;
-                deposited += quanta;
-                landed(texel, quanta);
-            }
-        }
-        let call = MassBalance { emitted, deposited, overspray: emitted - deposited, dripped: 0 };
-        self.mass_balance.emitted += call.emitted;
-        self.mass_balance.deposited += call.deposited;
-        self.mass_balance.overspray += call.overspray;
-        Ok(call)
+        let index = Arc::clone(&self.index);
+        let hits = |batch: &[(Shot, SprayModel)]| deposit_batch_each(&index, batch, &|each| *each, surface, threads);
+        self.deposit_hits(shots, emitted, &hits, landed, &mut |_, _| ())
     }
 }

@@ -1,5 +1,6 @@
 //! The shares of shots that texels catch, computed on a GPU.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::ball_tree::LEAF;
@@ -21,6 +22,14 @@ const WORDS: usize = 3;
 /// Leaves after which no other shot is taken in: bounds the memory of what is found.
 const ENOUGH_LEAVES: usize = 1 << 16;
 
+/// A leaf of the tree of texels that a shot may reach.
+struct Reached {
+    page: usize,
+    shot: u32,
+    /// Where its texels stand in the tree's order.
+    texels: Range<usize>,
+}
+
 /// A GPU that knows the texels.
 pub(super) struct GpuShares {
     pub(super) index: Arc<TexelIndex>,
@@ -35,7 +44,7 @@ impl GpuShares {
         let most = program.most_words() * 4 / TEXEL;
         let mut pages = Vec::new();
         let (mut first, mut end) = (0, 0);
-        let mut page = |range: std::ops::Range<usize>| -> Result<(), Error> {
+        let mut page = |range: Range<usize>| -> Result<(), Error> {
             let texel = |&texel: &u32| {
                 let texel = &index.texels[texel as usize];
                 let [p, n] = [&texel.point.coords, &*texel.normal];
@@ -65,14 +74,16 @@ impl GpuShares {
     /// it: what the processor finds, in the same order.
     pub(super) fn of_first(&self, shots: &[Shot], spray: &SprayModel) -> Result<Vec<Vec<(u32, f64)>>, Error> {
         let mut cones = Vec::with_capacity(shots.len() * CONE_NUMBERS);
-        // Texels of every leaf, and its page; leaves of every shot.
+        // Where the leaves of every shot end.
         let (mut leaves, mut ends, mut stack) = (Vec::new(), Vec::with_capacity(shots.len()), Vec::new());
         for shot in shots {
             let cone = Cone::new(spray, &shot.origin, &shot.axis);
             cones.extend(cone_numbers(&cone));
-            let page = |first: usize| self.pages.partition_point(|page| page.0 <= first) - 1;
-            let number = ends.len() as u32;
-            self.index.tree.for_each_leaf(&cone, &mut stack, |leaf| leaves.push((page(leaf.start), number, leaf)));
+            let shot = ends.len() as u32;
+            self.index.tree.for_each_leaf(&cone, &mut stack, |texels| {
+                let page = self.pages.partition_point(|page| page.0 <= texels.start) - 1;
+                leaves.push(Reached { page, shot, texels });
+            });
             ends.push(leaves.len());
             if leaves.len() >= ENOUGH_LEAVES {
                 break;
@@ -81,11 +92,11 @@ impl GpuShares {
         let mut found = vec![[0; WORDS * LEAF]; leaves.len()];
         let cones = doubles(&cones);
         for (page, (first, texels)) in self.pages.iter().enumerate() {
-            let here: Vec<usize> = (0..leaves.len()).filter(|&leaf| leaves[leaf].0 == page).collect();
+            let here: Vec<usize> = (0..leaves.len()).filter(|&leaf| leaves[leaf].page == page).collect();
             for here in here.chunks(LEAVES * self.program.most_groups(LEAVES * LEAF * WORDS)) {
                 let reference = |&leaf: &usize| {
-                    let (_, shot, range) = &leaves[leaf];
-                    [*shot, (range.start - first) as u32, range.len() as u32, 0]
+                    let Reached { shot, texels, .. } = &leaves[leaf];
+                    [*shot, (texels.start - first) as u32, texels.len() as u32, 0]
                 };
                 let references = words(&here.iter().flat_map(reference).collect::<Vec<u32>>());
                 let inputs = [Input::Sent(&cones), Input::Kept(texels), Input::Sent(&references)];
@@ -107,17 +118,13 @@ impl GpuShares {
     }
 
     /// The shares of a shot in the order in which the processor comes to them.
-    fn in_order(
-        &self,
-        leaves: &[(usize, u32, std::ops::Range<usize>)],
-        found: &[[u32; WORDS * LEAF]],
-    ) -> Vec<(u32, f64)> {
+    fn in_order(&self, leaves: &[Reached], found: &[[u32; WORDS * LEAF]]) -> Vec<(u32, f64)> {
         let mut shares = Vec::new();
         let mut claim = |lanes: &[u32], _: Points| {
             let share = |&place: &u32| {
                 let (leaf, lane) = (place as usize / LEAF, place as usize % LEAF);
                 let [low, high] = [0, 1].map(|word| u64::from(found[leaf][WORDS * lane + word]));
-                (self.index.tree.order()[leaves[leaf].2.start + lane], f64::from_bits(high << 32 | low))
+                (self.index.tree.order()[leaves[leaf].texels.start + lane], f64::from_bits(high << 32 | low))
             };
             shares.extend(lanes.iter().map(share).filter(|(_, share)| *share > 0.0));
         };
@@ -153,6 +160,7 @@ mod tests {
     use super::*;
     use crate::film::deposit::find_shares;
     use crate::film::{Film, Texel};
+    use crate::gpu::test_adapter;
     use crate::rng::Rng;
     use crate::surface::TriangleSurface;
 
@@ -165,21 +173,14 @@ mod tests {
         let mut unit = |least: f64| UnitVector3::new_normalize(Vector3::new(part(), part(), part() - least));
         let normals: Vec<_> = (0..3000).map(|k| if k == 0 { -Vector3::z_axis() } else { unit(0.3) }).collect();
         let texel = |(k, normal): (usize, UnitVector3<f64>)| Texel {
-            point: Point3::new(0.4 * (part)(), 0.4 * part(), 0.1 * part()),
+            point: Point3::new(0.4 * part(), 0.4 * part(), 0.1 * part()),
             normal,
             area: 10.0_f64.powf(-3.0 - 6.0 * (k % 100) as f64 / 100.0),
         };
         let film = Film::new(normals.into_iter().enumerate().map(texel).collect()).unwrap();
         let far = TriangleSurface::new(&[[0.0, 0.0, 9e3], [1.0, 0.0, 9e3], [0.0, 1.0, 9e3]], &[[0, 1, 2]]).unwrap();
-        let options = GpuOptions { software: true, ..GpuOptions::default() };
-        let gpu = match GpuShares::new(&film.index, &options) {
-            Ok(gpu) => gpu,
-            Err(error) => {
-                assert!(std::env::var_os("PAINTCOPTER_REQUIRE_GPU").is_none_or(|v| v != "1"), "{error}");
-                eprintln!("skipped: {error}");
-                return;
-            }
-        };
+        let Some(options) = test_adapter::options() else { return };
+        let gpu = GpuShares::new(&film.index, &options).unwrap();
         let usual = SprayModel::default();
         let sprays = [
             SprayModel { sigma: 0.3, ..usual },

@@ -15,7 +15,7 @@ pub(crate) fn doubles(values: &[f64]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::{GpuOptions, Input, Program, words};
+    use crate::gpu::{Input, Program, test_adapter, words};
     use rand_xoshiro::SplitMix64;
     use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 
@@ -69,15 +69,8 @@ mod tests {
 
     #[test]
     fn arithmetic_is_that_of_the_processor() {
-        let options = GpuOptions { software: true, ..GpuOptions::default() };
-        let program = match Program::new(&options, &format!("{DOUBLE}{PROBE}"), "probe") {
-            Ok(program) => program,
-            Err(error) => {
-                assert!(std::env::var_os("PAINTCOPTER_REQUIRE_GPU").is_none_or(|v| v != "1"), "{error}");
-                eprintln!("skipped: {error}");
-                return;
-            }
-        };
+        let Some(options) = test_adapter::options() else { return };
+        let program = Program::new(&options, &format!("{DOUBLE}{PROBE}"), "probe").unwrap();
         let mut rng = SplitMix64::seed_from_u64(1);
         let mut pairs: Vec<[f64; 2]> = (0..1 << 20).map(|_| [number(&mut rng), number(&mut rng)]).collect();
         // Sums that nearly vanish.

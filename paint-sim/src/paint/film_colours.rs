@@ -11,7 +11,7 @@ use crate::error::Error;
 /// Films side by side, so that a loop over them becomes vector code.
 const LANES: usize = 16;
 /// A film of a paint that does not absorb is the limit of one that hardly does.
-const LEAST_ABSORPTION: f32 = 1e-6;
+const LEAST_ABSORPTION: f64 = 1e-6;
 /// `2^f - 1 = f (c0 + c1 f + ...)` for `f` in `-1/2..=1/2`, by interpolation at the Chebyshev nodes: within 4e-9.
 const EXP2: [f32; 6] =
     [std::f32::consts::LN_2, 2.402_265_1e-1, 5.550_357_1e-2, 9.618_082_6e-3, 1.339_086_3e-3, 1.545_316_3e-4];
@@ -44,13 +44,11 @@ pub struct FilmColours {
 /// One band of a paint, as the formula needs it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Band {
-    /// `g = sqrt(K (K + 2 S))`, 1/m.
-    pub(super) decay: f32,
-    /// `-2 g / ln 2`.
+    /// `-2 g / ln 2` with `g = sqrt(K (K + 2 S))`, 1/m.
     pub(super) exponent: f32,
-    /// `K`, 1/m.
-    pub(super) absorption: f32,
-    /// `S`, 1/m.
+    /// `1 + K/g` and `1 - K/g`.
+    pub(super) sides: [f32; 2],
+    /// `S/g`.
     pub(super) scattering: f32,
 }
 
@@ -65,10 +63,10 @@ impl FilmColours {
         let weights = linear_srgb_weights();
         let band = |paint: &Paint, j: usize| {
             let (k, s) = (paint.absorption()[j], paint.scattering()[j]);
-            let decay = (k.sqrt() * (k + 2.0 * s).sqrt()) as f32;
-            let decay = decay.max(LEAST_ABSORPTION * (k + s) as f32).max(f32::EPSILON);
-            let exponent = -2.0 * std::f32::consts::LOG2_E * decay;
-            Band { decay, exponent, absorption: k as f32, scattering: s as f32 }
+            let decay = (k.sqrt() * (k + 2.0 * s).sqrt()).max(LEAST_ABSORPTION * (k + s)).max(f64::EPSILON);
+            let exponent = -2.0 * std::f64::consts::LOG2_E * decay;
+            let sides = [1.0 + k / decay, 1.0 - k / decay].map(|side| side as f32);
+            Band { exponent: exponent as f32, sides, scattering: (s / decay) as f32 }
         };
         Self {
             films: paints.iter().map(|paint| std::array::from_fn(|j| band(paint, j))).collect(),
@@ -140,8 +138,8 @@ fn linear_avx2(stack: &FilmColours, thickness: &[[f32; LANES]]) -> [[f32; LANES]
 }
 
 /// Red, green and blue of films. With `e = exp(-2 g d)`:
-/// `R = (Rg (g (1+e) - (1-e) K) + (1-e) S (1-Rg)) / (g (1+e) + (1-e) K + (1-e) S (1-Rg))`, Kubelka 1948 with its hyperbolic tangent written
-/// out; `1-e` is summed without cancellation. What a film reflects is the ground of the next.
+/// `R = (Rg (2 - l (1 + K/g)) + l S/g (1-Rg)) / (2 - l (1 - K/g) + l S/g (1-Rg))` and `l = 1-e`, Kubelka 1948 with its hyperbolic tangent
+/// written out; `l` is summed without cancellation. What a film reflects is the ground of the next.
 #[inline(always)]
 fn linear(stack: &FilmColours, thickness: &[[f32; LANES]]) -> [[f32; LANES]; 3] {
     let mut colours = [[0.0; LANES]; 3];
@@ -158,15 +156,13 @@ fn linear(stack: &FilmColours, thickness: &[[f32; LANES]]) -> [[f32; LANES]; 3] 
                 let [c0, c1, c2, c3, c4, c5] = EXP2;
                 let rest = scale * (part * (c0 + part * (c1 + part * (c2 + part * (c3 + part * (c4 + part * c5))))));
                 let lost = (1.0 - scale) - rest;
-                let passed = band.decay * (1.0 + (scale + rest));
-                let absorbed = lost * band.absorption;
-                let scattered = lost * (band.scattering * (1.0 - reflectance[lane]));
-                reflectance[lane] =
-                    (reflectance[lane] * (passed - absorbed) + scattered) / (passed + absorbed + scattered);
+                let scattered = lost * band.scattering * (1.0 - reflectance[lane]);
+                let [less, more] = band.sides.map(|side| 2.0 - lost * side);
+                reflectance[lane] = (reflectance[lane] * less + scattered) / (more + scattered);
             }
         }
-        for (colour, weight) in colours.iter_mut().zip(weights) {
-            for lane in 0..LANES {
+        for lane in 0..LANES {
+            for (colour, weight) in colours.iter_mut().zip(weights) {
                 colour[lane] += reflectance[lane] * weight;
             }
         }

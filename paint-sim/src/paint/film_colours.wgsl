@@ -6,7 +6,7 @@ struct Settings {
 }
 
 @group(0) @binding(0) var<uniform> settings: Settings;
-// Film after film: decay, exponent, absorption and scattering of every band.
+// Film after film, of every band: exponent, both sides and scattering.
 @group(0) @binding(1) var<storage, read> paints: array<vec4<f32>>;
 // Of every band: its weights in red, green and blue, and what the ground reflects; then, in fours, the least linear component of every code.
 @group(0) @binding(2) var<storage, read> looks: array<vec4<f32>>;
@@ -18,15 +18,14 @@ const BANDS: u32 = 36u;
 const INFINITE: u32 = 0x7f800000u;
 const LARGEST: u32 = 0x7f7fffffu;
 
-// 1 - exp2(power) and 1 + exp2(power), of a power from -126 to 0.
-fn lost_and_kept(power: f32) -> vec2<f32> {
+// 1 - exp2(power), of a power from -126 to 0.
+fn lost_at(power: f32) -> f32 {
     let whole = round(power);
     let part = power - whole;
     let scale = bitcast<f32>(u32(i32(whole) + 127) << 23u);
     let series = 0.6931471805599453 + part * (2.4022651e-1 + part * (5.5503571e-2
         + part * (9.6180826e-3 + part * (1.3390863e-3 + part * 1.5453163e-4))));
-    let rest = scale * (part * series);
-    return vec2((1.0 - scale) - rest, 1.0 + (scale + rest));
+    return (1.0 - scale) - scale * (part * series);
 }
 
 fn linear_at(place: u32) -> vec3<f32> {
@@ -39,11 +38,9 @@ fn linear_at(place: u32) -> vec3<f32> {
             let word = thickness[film * settings.places + place];
             // Neither infinite nor not a number: of those a device may make anything.
             let depth = bitcast<f32>(select(0u, min(word, LARGEST), word <= INFINITE));
-            let both = lost_and_kept(max(depth * paint.y, -126.0));
-            let passed = paint.x * both.y;
-            let absorbed = both.x * paint.z;
-            let scattered = both.x * (paint.w * (1.0 - reflectance));
-            reflectance = (reflectance * (passed - absorbed) + scattered) / (passed + absorbed + scattered);
+            let lost = lost_at(max(depth * paint.x, -126.0));
+            let scattered = lost * paint.w * (1.0 - reflectance);
+            reflectance = (reflectance * (2.0 - lost * paint.y) + scattered) / (2.0 - lost * paint.z + scattered);
         }
         colour += reflectance * look.xyz;
     }

@@ -26,7 +26,7 @@ impl GpuFilmColours {
     /// # Errors
     /// [`Error::Gpu`]: there is none, or it refuses.
     pub fn new(films: &FilmColours, options: &GpuOptions) -> Result<Self, Error> {
-        let band = |band: &Band| [band.decay, band.exponent, band.absorption, band.scattering];
+        let band = |band: &Band| [band.exponent, band.sides[0], band.sides[1], band.scattering];
         let mut paints: Vec<f32> = films.films.iter().flatten().flat_map(band).collect();
         // A buffer holds at least something.
         paints.resize(paints.len().max(4), 0.0);

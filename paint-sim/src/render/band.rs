@@ -3,14 +3,12 @@
 use nalgebra::{Point3, Vector3};
 
 use super::camera::Camera;
+use super::lamp::Lamp;
 use super::lights::Lights;
 use super::seen::{MAX_RAY_LENGTH, Seen};
 use super::shading::Shading;
 use crate::colour::Srgb8Table;
-use crate::surface::{Hit, Surface};
-
-/// Rays along the edge of a tile: few triangles are in so narrow a pyramid, and many rays share them.
-const TILE: u32 = 16;
+use crate::surface::{Hit, ShadowRay, Surface};
 
 /// Some whole rows of the frame, so that threads can own what they write.
 pub(super) struct Band<'a> {
@@ -40,9 +38,9 @@ struct Rays {
 }
 
 impl BandRenderer<'_> {
-    /// Pixels along the edge of a tile, rows of a band.
+    /// Pixels along the edge of a tile, rows of a band: so many that the surface is asked for as many rays as it likes to be.
     pub(super) fn tile_edge(&self) -> usize {
-        (TILE / self.supersampling).max(1) as usize
+        (self.surface.rays_at_once().isqrt() / self.supersampling as usize).max(1)
     }
 
     pub(super) fn fill(&self, band: &mut Band) {
@@ -121,14 +119,23 @@ impl BandRenderer<'_> {
         let facing_sun: Vec<Point3<f64>> = seen.iter().flatten().filter(faces_sun).map(|seen| seen.point).collect();
         let dark = self.surface.occluded_parallel(&facing_sun, &self.lights.towards_sun, MAX_RAY_LENGTH);
         let mut dark = dark.into_iter();
-        let light = |(seen, direction): (&Option<Seen>, &Vector3<f64>)| match seen {
+        let lit: Vec<Vec<bool>> = self.lights.lamps.iter().map(|lamp| self.lit(lamp, &seen)).collect();
+        let light = |(k, (seen, direction)): (usize, (&Option<Seen>, &Vector3<f64>))| match seen {
             None => self.lights.background(direction),
             Some(seen) => {
                 let sunny = seen.faces_sun(self.lights) && dark.next() == Some(false);
-                seen.light(self.surface, self.lights, sunny)
+                seen.light(self.lights, sunny, |lamp| lit[lamp][k])
             }
         };
-        seen.iter().zip(&rays.directions).map(light).collect()
+        seen.iter().zip(&rays.directions).enumerate().map(light).collect()
+    }
+
+    /// Which points a lamp lights.
+    fn lit(&self, lamp: &Lamp, seen: &[Option<Seen>]) -> Vec<bool> {
+        let towards = |seen: &Option<Seen>| seen.as_ref().and_then(|seen| seen.towards_lamp(lamp));
+        let rays: Vec<Option<ShadowRay>> = seen.iter().map(towards).collect();
+        let mut dark = self.surface.occluded_each(&rays.iter().flatten().copied().collect::<Vec<_>>()).into_iter();
+        rays.iter().map(|ray| ray.is_some() && dark.next() == Some(false)).collect()
     }
 }
 

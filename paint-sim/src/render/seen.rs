@@ -3,9 +3,10 @@
 use nalgebra::{Point3, Vector3};
 
 use super::coat::Coat;
+use super::lamp::Lamp;
 use super::lights::Lights;
 use super::shading::Shading;
-use crate::surface::Surface;
+use crate::surface::ShadowRay;
 
 /// Rays end here, m: beyond it there is only background.
 pub(super) const MAX_RAY_LENGTH: f64 = 1e4;
@@ -32,8 +33,15 @@ impl Seen {
         lights.sun.iter().any(|c| *c != 0.0) && self.shading_normal().dot(&lights.towards_sun) > 0.0
     }
 
-    /// The sun where it is `sunny`, lamps unless something stands before them, sky and ambient light as if nothing did.
-    pub(super) fn light(&self, surface: &dyn Surface, lights: &Lights, sunny: bool) -> [f32; 3] {
+    /// The ray that must be free for a lamp to light it; `None` where it is behind the surface.
+    pub(super) fn towards_lamp(&self, lamp: &Lamp) -> Option<ShadowRay> {
+        let (direction, length, _) = lamp.seen_from(&self.point)?;
+        let faces = self.shading_normal().dot(&direction) > 0.0;
+        faces.then_some(ShadowRay { origin: self.point, direction, from: 0.0, length })
+    }
+
+    /// The sun where it is `sunny`, the lamps that are `lit` by number, sky and ambient light as if nothing stood before them.
+    pub(super) fn light(&self, lights: &Lights, sunny: bool, lit: impl Fn(usize) -> bool) -> [f32; 3] {
         let Shading { albedo, coat, .. } = &self.shading;
         let normal = self.shading_normal();
         // Of one light that reaches it: the shares that paint and coat send to the eye.
@@ -44,10 +52,9 @@ impl Seen {
         let [matt, gloss] = if sunny { shares(&lights.towards_sun) } else { [0.0; 2] };
         let mut on_paint: [f32; 3] = std::array::from_fn(|c| lights.sun[c] * matt);
         let mut off_coat = lights.sun.map(|sun| sun * gloss);
-        for lamp in &lights.lamps {
-            let Some((towards, distance, light)) = lamp.seen_from(&self.point) else { continue };
-            let lit = normal.dot(&towards) > 0.0 && !surface.occluded(&self.point, &towards, distance);
-            let [matt, gloss] = if lit { shares(&towards) } else { [0.0; 2] };
+        for (number, lamp) in lights.lamps.iter().enumerate() {
+            let Some((towards, _, light)) = lamp.seen_from(&self.point) else { continue };
+            let [matt, gloss] = if lit(number) { shares(&towards) } else { [0.0; 2] };
             on_paint = std::array::from_fn(|c| on_paint[c] + light[c] * matt);
             off_coat = std::array::from_fn(|c| off_coat[c] + light[c] * gloss);
         }

@@ -33,14 +33,18 @@ const DARK: u32 = u32::MAX - 2;
 /// processor, and so is everything once the device has failed.
 pub struct GpuSurface<'a> {
     surface: &'a TriangleSurface,
-    tree: GpuTree,
+    /// Where coordinates begin on the device.
+    origin: Vector3<f64>,
+    /// Largest coordinates on the device and in the world, m.
+    reach: [f64; 2],
     nodes: wgpu::Buffer,
     triangles: wgpu::Buffer,
     first: Program,
     occluded: Program,
     fallback: Fallback,
     asked: AtomicU64,
-    doubtful: AtomicU64,
+    checked: AtomicU64,
+    left: AtomicU64,
 }
 
 /// How many rays a GPU was asked for, and how many of them it left to the processor.
@@ -48,6 +52,8 @@ pub struct GpuSurface<'a> {
 pub struct GpuRayCount {
     /// Rays that it was asked for.
     pub asked: u64,
+    /// Shadow rays of which it named the only triangle that may be in their way: the processor asked that one.
+    pub checked: u64,
     /// Rays that the processor searched for.
     pub left: u64,
 }
@@ -59,14 +65,15 @@ impl<'a> GpuSurface<'a> {
     /// [`Error::Gpu`]: there is none, it refuses, or it cannot hold the triangles. Triangles smaller in all than a micrometre, or farther than
     /// 1e9 m.
     pub fn new(surface: &'a TriangleSurface, options: &GpuOptions) -> Result<Self, Error> {
-        let mut tree = GpuTree::new(surface.corners());
-        check_range("size of a surface on a GPU", tree.size, SIZES[0], SIZES[1], "between 1e-6 and 1e9 m")?;
-        check_range("coordinate of a surface on a GPU", tree.farthest, 0.0, SIZES[1], "within 1e9 m")?;
+        let GpuTree { nodes, triangles, origin, size, farthest } = GpuTree::new(surface.corners());
+        check_range("size of a surface on a GPU", size, SIZES[0], SIZES[1], "between 1e-6 and 1e9 m")?;
+        check_range("coordinate of a surface on a GPU", farthest, 0.0, SIZES[1], "within 1e9 m")?;
         let [first, occluded] = [Program::new(options, SOURCE, "first")?, Program::new(options, SOURCE, "occluded")?];
-        let nodes = first.keep(&words(&std::mem::take(&mut tree.nodes)))?;
-        let triangles = first.keep(&words(&std::mem::take(&mut tree.triangles)))?;
-        let (asked, doubtful) = (AtomicU64::new(0), AtomicU64::new(0));
-        Ok(Self { surface, tree, nodes, triangles, first, occluded, fallback: Fallback::default(), asked, doubtful })
+        let [nodes, triangles] = [first.keep(&words(&nodes))?, first.keep(&words(&triangles))?];
+        let [asked, checked, left] = [0; 3].map(AtomicU64::new);
+        let fallback = Fallback::default();
+        let reach = [size, farthest];
+        Ok(Self { surface, origin, reach, nodes, triangles, first, occluded, fallback, asked, checked, left })
     }
 
     /// Name and driver of the adapter.
@@ -86,7 +93,9 @@ impl<'a> GpuSurface<'a> {
 
     /// Rays so far.
     pub fn rays(&self) -> GpuRayCount {
-        GpuRayCount { asked: self.asked.load(Ordering::Relaxed), left: self.doubtful.load(Ordering::Relaxed) }
+        let [asked, checked, left] =
+            [&self.asked, &self.checked, &self.left].map(|count| count.load(Ordering::Relaxed));
+        GpuRayCount { asked, checked, left }
     }
 
     /// What a program says of rays: origin, direction, and between which distances from the origin.
@@ -95,8 +104,8 @@ impl<'a> GpuSurface<'a> {
         let mut answers = Vec::with_capacity(rays.len());
         for rays in rays.chunks(most) {
             let packed: Vec<u32> = rays.iter().flat_map(|ray| self.packed(ray)).map(f32::to_bits).collect();
-            let [size, rounding] =
-                [self.tree.size, self.tree.farthest * 2.0_f64.powi(-46)].map(|v| (v as f32).to_bits());
+            // By sixteen roundings of the processor.
+            let [size, rounding] = [self.reach[0], self.reach[1] * 2.0_f64.powi(-48)].map(|v| (v as f32).to_bits());
             let uniform = words(&[rays.len() as u32, self.node_count(), size, rounding, 0, 0, 0, 0]);
             let inputs = [Input::Kept(&self.nodes), Input::Kept(&self.triangles), Input::Sent(&words(&packed))];
             let found =
@@ -107,7 +116,7 @@ impl<'a> GpuSurface<'a> {
         }
         self.asked.fetch_add(rays.len() as u64, Ordering::Relaxed);
         let left = answers.iter().filter(|answer| **answer == DOUBTFUL).count();
-        self.doubtful.fetch_add(left as u64, Ordering::Relaxed);
+        self.left.fetch_add(left as u64, Ordering::Relaxed);
         answers
     }
 
@@ -117,7 +126,7 @@ impl<'a> GpuSurface<'a> {
 
     /// Whether the bounds hold for a ray.
     fn is_fit(&self, (origin, direction, [_, end]): &(Point3<f64>, Vector3<f64>, [f64; 2])) -> bool {
-        (origin.coords - self.tree.origin).amax() <= SIZES[1]
+        (origin.coords - self.origin).amax() <= SIZES[1]
             && (direction.norm() - 1.0).abs() <= UNIT
             && (0.0..=SIZES[1]).contains(end)
     }
@@ -127,7 +136,7 @@ impl<'a> GpuSurface<'a> {
             return [0.0; RAY];
         }
         let (origin, direction, [start, end]) = ray;
-        let from = origin.coords - self.tree.origin;
+        let from = origin.coords - self.origin;
         let near = from.map(|v| v as f32);
         let rest = (from - near.map(f64::from)).map(|v| v as f32);
         let [start, end] = [*start as f32, *end as f32];
@@ -181,7 +190,10 @@ impl Surface for GpuSurface<'_> {
                     triangle => self.surface.cast_at(triangle, &start, direction, *length).is_some(),
                 }
         };
-        self.ask(&self.occluded, &rays.iter().map(ends).collect::<Vec<_>>()).into_iter().zip(rays).map(dark).collect()
+        let answers = self.ask(&self.occluded, &rays.iter().map(ends).collect::<Vec<_>>());
+        let checked = answers.iter().filter(|answer| **answer < DARK).count();
+        self.checked.fetch_add(checked as u64, Ordering::Relaxed);
+        answers.into_iter().zip(rays).map(dark).collect()
     }
 
     fn rays_at_once(&self) -> usize {

@@ -61,7 +61,7 @@ fn side(direction: vec3<f32>, edge: vec3<f32>, corner: vec3<f32>) -> vec2<f32> {
     let e = abs(edge);
     let c = abs(corner);
     let terms = dot(abs(direction), e.yzx * c.zxy + e.zxy * c.yzx);
-    let bound = 16.0 * U * terms + 4.0 * offset * sum_of(e) + TINY;
+    let bound = 20.0 * U * terms + 4.0 * offset * sum_of(e) + TINY;
     return vec2(dot(direction, cross(edge, corner)), bound);
 }
 
@@ -136,9 +136,9 @@ fn narrow(ray: Ray, first: u32) {
     let across = corner(first + 2u) - corner(first);
     let normal = cross(along, across);
     let slope = dot(normal, ray.direction);
-    if abs(slope) > 32.0 * U * sum_of(abs(along)) * sum_of(abs(across)) {
+    if abs(slope) > 64.0 * U * sum_of(abs(along)) * sum_of(abs(across)) {
         let distance = dot(normal, a) / slope;
-        let bound = 4.0 * height(ray, abs(distance), a, along, across).y / abs(slope) + 16.0 * U * abs(distance);
+        let bound = 6.0 * height(ray, abs(distance), a, along, across).y / abs(slope) + 16.0 * U * abs(distance);
         nearest = max(nearest, distance - bound);
         farthest = min(farthest, distance + bound);
     }

@@ -1,6 +1,7 @@
 //! What runs on a GPU against what the processor computes.
 
 mod film_colours;
+mod render;
 mod spray;
 mod surface;
 

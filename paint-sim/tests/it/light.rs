@@ -188,30 +188,37 @@ fn nothing_is_seen_in_a_furnace() {
 
 /// Inverse square and cosine on a plane, and the shadow of a plate before the lamp.
 #[test]
-fn a_lamp_lights_by_distance_and_cosine_and_throws_shadows() {
-    let lamp = Lamp { position: Point3::new(0.3, -0.2, 1.0), light: [0.9, 0.5, 0.25] };
-    let lights = Lights::without_sun(Sky::uniform([0.0; 3]).unwrap(), vec![lamp]);
+fn lamps_light_by_distance_and_cosine_and_throw_shadows() {
+    let lamps = [([0.3, -0.2, 1.0], [0.5, 0.3, 0.1]), ([1.3, 0.2, 1.0], [0.1, 0.2, 0.4])];
+    let lamp = |(position, light): ([f64; 3], [f32; 3])| Lamp { position: position.into(), light };
+    let lights = Lights::without_sun(Sky::uniform([0.0; 3]).unwrap(), lamps.map(lamp).into());
     let mut positions = WALL.to_vec();
     positions.extend([[0.5, -9.0, 1.5], [0.8, -9.0, 1.5], [0.8, 9.0, 1.5], [0.5, 9.0, 1.5]]);
     let frame = seen(&positions, &[[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]], &lights, 1);
-    let mut shaded = 0;
+    let mut shaded = [0; 2];
     for (k, colour) in frame.colour.iter().enumerate().filter(|(k, _)| frame.faces[*k] < 2) {
         let (u, v) = ((k % SIDE as usize) as f64 - 16.0, (k / SIDE as usize) as f64 - 16.0);
         let (x, y) = (u / 10.0, v / 10.0);
-        // The lamp's rays cross the plate half way to the wall.
-        let crossing = 0.5 * (0.3 + x);
-        if (crossing - 0.5).abs() < 1e-3 || (crossing - 0.8).abs() < 1e-3 {
+        // The lamps' rays cross the plate half way to the wall.
+        let crossings = lamps.map(|([across, ..], _)| 0.5 * (across + x));
+        if crossings.iter().any(|crossing| (crossing - 0.5).abs() < 1e-3 || (crossing - 0.8).abs() < 1e-3) {
             continue;
         }
-        let way = Vector3::new(0.3 - x, -0.2 - y, -1.0);
-        let shine = if (0.5..0.8).contains(&crossing) { 0.0 } else { 1.0 / way.norm().powi(3) };
-        shaded += u32::from(shine == 0.0);
-        for (c, light) in [0.9, 0.5, 0.25].into_iter().enumerate() {
-            let expected = encode_srgb8(light * shine).0;
-            assert!(colour[c].abs_diff(expected) <= 1, "{x} {y}: {} instead of {expected}", colour[c]);
+        let mut expected = [0.0; 3];
+        for (k, ([across, up, _], light)) in lamps.into_iter().enumerate() {
+            if (0.5..0.8).contains(&crossings[k]) {
+                shaded[k] += 1;
+                continue;
+            }
+            let shine = Vector3::new(across - x, up - y, -1.0).norm().powi(-3);
+            expected = std::array::from_fn(|c| expected[c] + f64::from(light[c]) * shine);
+        }
+        for c in 0..3 {
+            let code = encode_srgb8(expected[c]).0;
+            assert!(colour[c].abs_diff(code) <= 1, "{x} {y}: {} instead of {code}", colour[c]);
         }
     }
-    assert!(shaded > 30);
+    assert!(shaded.iter().all(|shaded| *shaded > 30), "{shaded:?}");
     // 4π² lumens from everywhere: π candela, and 1 cd/m² of a white surface 1 m away.
     let warm = Lamp::new(Point3::origin(), 4.0 * PI * PI, 2856.0).unwrap();
     assert!((luminance(warm.light) - 1.0).abs() < 1e-3);
