@@ -6,9 +6,9 @@ use std::time::Instant;
 
 use clap::Parser;
 use nalgebra::{Point3, Vector3};
-use paint_sim::gpu::GpuOptions;
 use paint_sim::paint::{FilmColours, GpuFilmColours};
 use paint_sim::render::{Lights, Shading};
+use paint_sim::surface::GpuOptions;
 use paint_sim::surface::{GpuSurface, Hit, Surface};
 use paint_sim::{Camera, Film, Paint, Shot, SprayModel, Substrate, render};
 use paintcopter::mission::MissionSettings;

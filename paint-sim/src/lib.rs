@@ -88,7 +88,7 @@ pub mod film;
 pub mod flight;
 pub mod gantry_robot;
 #[cfg(feature = "gpu")]
-pub mod gpu;
+mod gpu;
 pub mod km;
 mod least_squares;
 pub mod paint;

@@ -15,6 +15,8 @@ mod shadow_packet;
 mod sheared_ray;
 
 #[cfg(feature = "gpu")]
+pub use crate::gpu::GpuOptions;
+#[cfg(feature = "gpu")]
 pub use gpu_surface::{GpuRayCount, GpuSurface};
 pub use mesh::TriangleSurface;
 pub use ray_query::{Hit, ShadowRay, Surface};

@@ -6,7 +6,7 @@ mod spray;
 mod surface;
 
 use paint_sim::Error;
-use paint_sim::gpu::GpuOptions;
+use paint_sim::surface::GpuOptions;
 
 /// Any adapter, also one that is a program.
 pub(crate) fn options() -> GpuOptions {

@@ -1,8 +1,8 @@
 //! Colours of stacks of films: within what the eye sees of the closed form in double precision.
 
 use paint_sim::colour::{ciede2000, encode_srgb8, linear_srgb_lab, spectrum_linear_srgb};
-use paint_sim::gpu::GpuOptions;
 use paint_sim::paint::{FilmColours, GpuFilmColours, PIGMENTS, PaintName};
+use paint_sim::surface::GpuOptions;
 use paint_sim::{Paint, Substrate};
 
 use super::{available, options, random};

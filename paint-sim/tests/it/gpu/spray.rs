@@ -1,7 +1,7 @@
 //! Spray on texels: the same paint on every texel, to the femtolitre.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use paint_sim::gpu::GpuOptions;
+use paint_sim::surface::GpuOptions;
 use paint_sim::surface::GpuSurface;
 use paint_sim::{Error, Film, Shot, SprayModel, Texel, TriangleSurface};
 

@@ -1,7 +1,7 @@
 //! Rays on a GPU: what each hits is what the processor says, also where single precision could not know it.
 
 use nalgebra::{Point3, Rotation3, Vector3};
-use paint_sim::gpu::GpuOptions;
+use paint_sim::surface::GpuOptions;
 use paint_sim::surface::{GpuSurface, ShadowRay, Surface};
 use paint_sim::{Error, TriangleSurface};
 
