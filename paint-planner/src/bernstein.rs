@@ -51,18 +51,10 @@ impl Bernstein {
         self.len - 1
     }
 
-    /// `factor` times the polynomial.
-    pub(crate) fn scaled(&self, factor: f64) -> Self {
-        Self { coefficients: self.coefficients.map(|c| factor * c), len: self.len }
-    }
-
-    /// Integral from 0 to `s`.
-    pub(crate) fn integral(&self, s: f64) -> f64 {
-        let mut own = [0.0; MAX];
-        for (k, c) in self.all().iter().enumerate() {
-            own[k + 1] = own[k] + c / self.len as f64;
-        }
-        Self { coefficients: own, len: self.len + 1 }.value(s)
+    /// Its `N` coefficients, of degree `N - 1`, which is not below its own.
+    pub(crate) fn coefficients_of_degree<const N: usize>(&self) -> [f64; N] {
+        let all = if self.len < N { self.elevated(N - 1) } else { *self };
+        std::array::from_fn(|k| all.coefficients[k])
     }
 
     /// Value at `s`.
@@ -179,8 +171,6 @@ mod tests {
         assert!((square.greatest_ratio(&one.elevated(4), 0.0, 1e-12) - 0.0625).abs() < 1e-11);
         assert!((square.value(0.3) - 0.0441).abs() < 1e-15);
         assert!((bump.derivative().value(0.25) - 0.5).abs() < 1e-15);
-        // s^2/2 - s^3/3 at 1/2.
-        assert!((bump.integral(0.5) - 1.0 / 12.0).abs() < 1e-15);
         // s (1 - s) / (1 + s)^2 has its maximum 1/8 at 1/3.
         let shifted = Bernstein::new(&[1.0, 2.0]);
         assert!((bump.greatest_ratio(&shifted.product(&shifted), 0.0, 1e-12) - 0.125).abs() < 1e-11);

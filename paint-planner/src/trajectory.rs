@@ -62,7 +62,7 @@ impl Trajectory {
                 knot_derivatives(stretch, own, &begin).ok_or(Error::Numerical { stage: "the minimum-snap system" })?;
             for (i, &t) in own.iter().enumerate() {
                 let path = hermite(&stretch[i], &derivatives[i], &stretch[i + 1], &derivatives[i + 1], t);
-                segments.push(Segment { path, slowness: Bernstein::new(&[t]) });
+                segments.push(Segment::new(&path, &Bernstein::new(&[t])));
             }
             first = last;
         }

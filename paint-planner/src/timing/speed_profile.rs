@@ -175,24 +175,25 @@ pub(crate) fn joint_motion(from: &VehicleState, to: &VehicleState) -> f64 {
 /// Time between two halts, s: the closed form of the minimum-snap polynomial.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RestToRest {
-    per_metre: f64,
-    per_root_metre: f64,
-    per_radian: f64,
+    /// s/m, s/√m and s/rad: of speed, acceleration and heading rate.
+    way: f64,
+    root: f64,
+    turn: f64,
 }
 
 impl RestToRest {
     pub(crate) fn new(settings: &TimingSettings) -> Self {
         // The certificate may exceed the closed form in the last digits.
         Self {
-            per_metre: 1.001 * PEAK_SPEED / settings.max_speed,
-            per_root_metre: 1.001 * (PEAK_ACCELERATION / settings.max_acceleration).sqrt(),
-            per_radian: 1.001 * PEAK_SPEED / settings.max_heading_rate,
+            way: 1.001 * PEAK_SPEED / settings.max_speed,
+            root: 1.001 * (PEAK_ACCELERATION / settings.max_acceleration).sqrt(),
+            turn: 1.001 * PEAK_SPEED / settings.max_heading_rate,
         }
     }
 
     /// Over `travel` metres and `turn` radians.
     pub(crate) fn duration(&self, travel: f64, turn: f64) -> f64 {
-        (self.per_metre * travel).max(self.per_root_metre * travel.sqrt()).max(self.per_radian * turn)
+        (self.way * travel).max(self.root * travel.sqrt()).max(self.turn * turn)
     }
 }
 

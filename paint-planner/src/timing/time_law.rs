@@ -136,8 +136,8 @@ fn pieces(path: &Trajectory, rest: &[bool], edges: &[Edge], settings: &TimingSet
                 since = until;
             }
             let acceleration = own.iter().fold(settings.max_acceleration, |least, e| least.min(e.acceleration));
-            let (path, length) = (segment.path.map(|axis| axis.part(from, to)), duration * (to - from));
-            let extrema = Segment { path, slowness: Bernstein::new(&[length]) }.extrema(&Extrema::default(), COARSE);
+            let (path, length) = (segment.path().map(|axis| axis.part(from, to)), duration * (to - from));
+            let extrema = Segment::new(&path, &Bernstein::new(&[length])).extrema(&Extrema::default(), COARSE);
             let by_rate = (extrema.speed / settings.max_speed).max(extrema.heading_rate / settings.max_heading_rate);
             let piece = Piece { path, length, slowness: asked.max(by_rate), asked: mean, acceleration };
             if let Some(span) = spans.last_mut() {
@@ -224,7 +224,7 @@ fn spline(span: &[Piece], slowness: &[f64]) -> Vec<Segment> {
         let from = if i > 0 { between(i - 1) } else { slowness[i] };
         let to = if i + 1 < span.len() { between(i) } else { slowness[i] };
         let slowness = Bernstein::new(&[from, slowness[i], to].map(|slowness| slowness * piece.length));
-        Segment { path: piece.path, slowness }
+        Segment::new(&piece.path, &slowness)
     };
     span.iter().enumerate().map(segment).collect()
 }

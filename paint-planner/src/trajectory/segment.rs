@@ -8,34 +8,58 @@ use nalgebra::{Point3, Vector4};
 /// Newton steps to the parameter at a time; the time law is monotone and nearly linear.
 const NEWTON: usize = 12;
 
-/// A path `q(s)`, s from 0 to 1, along which time passes at the rate `dt/ds`.
+/// A path `q(s)`, s from 0 to 1, along which time passes at the rate `dt/ds`. Held by its coefficients alone, as flights have millions of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Segment {
-    /// x, y, z in m, heading in rad.
-    pub(crate) path: [Bernstein; 4],
-    /// `dt/ds`, s: greater than 0, of degree 0 or 2.
-    pub(crate) slowness: Bernstein,
+    /// Bernstein coefficients of x, y, z in m, heading in rad.
+    path: [[f64; 8]; 4],
+    /// Those of `dt/ds`, s: greater than 0, all the same where time passes evenly.
+    slowness: [f64; 3],
 }
 
 impl Segment {
+    /// Of a path of degree 7 at most, and `dt/ds` of degree 0 or 2.
+    pub(crate) fn new(path: &[Bernstein; 4], slowness: &Bernstein) -> Self {
+        Self {
+            path: path.each_ref().map(Bernstein::coefficients_of_degree),
+            slowness: slowness.coefficients_of_degree(),
+        }
+    }
+
+    /// x, y, z in m, heading in rad.
+    pub(crate) fn path(&self) -> [Bernstein; 4] {
+        self.path.map(|axis| Bernstein::new(&axis))
+    }
+
+    fn slowness(&self) -> Bernstein {
+        Bernstein::new(if self.is_even() { &self.slowness[..1] } else { &self.slowness })
+    }
+
+    /// Whether time passes evenly.
+    fn is_even(&self) -> bool {
+        let [first, middle, last] = self.slowness;
+        first == middle && middle == last
+    }
+
     /// How long it is flown, s.
     pub(crate) fn duration(&self) -> f64 {
-        self.slowness.integral(1.0)
+        self.time(1.0)
     }
 
     /// Time since its beginning at `s`, s.
     pub(crate) fn time(&self, s: f64) -> f64 {
-        self.slowness.integral(s)
+        let [a, b, c] = self.slowness;
+        if self.is_even() { a * s } else { derivatives([0.0, a / 3.0, (a + b) / 3.0, (a + b + c) / 3.0], s)[0] }
     }
 
     /// The share `s` of the path at a time since its beginning, the inverse of [`time`](Self::time).
     fn parameter(&self, time: f64) -> f64 {
         let mut s = (time / self.duration()).clamp(0.0, 1.0);
-        if self.slowness.degree() == 0 {
+        if self.is_even() {
             return s;
         }
         for _ in 0..NEWTON {
-            let step = (time - self.time(s)) / self.slowness.value(s);
+            let step = (time - self.time(s)) / derivatives(self.slowness, s)[0];
             s = (s + step).clamp(0.0, 1.0);
             if step.abs() < 1e-15 {
                 break;
@@ -60,13 +84,11 @@ impl Segment {
     /// Place, and velocity, acceleration and jerk, at a time since the beginning.
     pub(crate) fn motion(&self, time: f64) -> (Vector4<f64>, KnotDerivatives) {
         let s = self.parameter(time);
-        let slope = self.slowness.derivative();
-        let (w, w1, w2) = (self.slowness.value(s), slope.value(s), slope.derivative().value(s));
+        let [w, w1, w2, _] = derivatives(self.slowness, s);
         let (mut value, mut motion) = (Vector4::zeros(), KnotDerivatives::zeros());
         for (axis, path) in self.path.iter().enumerate() {
-            let (first, second) = (path.derivative(), path.derivative().derivative());
-            let [q1, q2, q3] = [first, second, second.derivative()].map(|curve| curve.value(s));
-            value[axis] = path.value(s);
+            let [q, q1, q2, q3] = derivatives(*path, s);
+            value[axis] = q;
             // d/dt = (1/w) d/ds, again and again.
             motion[(0, axis)] = q1 / w;
             motion[(1, axis)] = (q2 - q1 * w1 / w) / w.powi(2);
@@ -78,21 +100,21 @@ impl Segment {
     /// Certified extrema of the segment, above the true ones by a fraction of `tight` at most, and no less than `floor`: what is below need
     /// not be resolved.
     pub(crate) fn extrema(&self, floor: &Extrema, tight: f64) -> Extrema {
-        let rates = self.path.map(|path| path.derivative());
-        let square = self.slowness.product(&self.slowness);
+        let (rates, slowness) = (self.path().map(|path| path.derivative()), self.slowness());
+        let square = slowness.product(&slowness);
         let root = |squares: Bernstein, below: Bernstein, floor: f64| {
             squares.greatest_ratio(&below.elevated(squares.degree()), floor * floor, tight).sqrt()
         };
         // The acceleration is q''/w^2, or (q'' w - q' w')/w^3 where w changes.
         let second = |axis: usize| {
             let second = rates[axis].derivative();
-            match self.slowness.degree() {
+            match slowness.degree() {
                 0 => second,
-                _ => second.product(&self.slowness).minus(&rates[axis].product(&self.slowness.derivative())),
+                _ => second.product(&slowness).minus(&rates[axis].product(&slowness.derivative())),
             }
         };
         let fourth = square.product(&square);
-        let below = if self.slowness.degree() == 0 { fourth } else { fourth.product(&square) };
+        let below = if slowness.degree() == 0 { fourth } else { fourth.product(&square) };
         Extrema {
             speed: root(Bernstein::sum_of_squares(&rates[..3]), square, floor.speed),
             acceleration: root(Bernstein::sum_of_squares(&[0, 1, 2].map(second)), below, floor.acceleration),
@@ -102,8 +124,32 @@ impl Segment {
 
     /// The same path flown `k` times slower.
     pub(crate) fn stretched(&self, k: f64) -> Self {
-        Self { slowness: self.slowness.scaled(k), ..*self }
+        Self { slowness: self.slowness.map(|slowness| k * slowness), ..*self }
     }
+}
+
+/// Value and first three derivatives of a polynomial of degree `N - 1` by its Bernstein coefficients: de Casteljau's scheme, whose last rows hold
+/// them as differences.
+#[inline(always)]
+fn derivatives<const N: usize>(mut row: [f64; N], s: f64) -> [f64; 4] {
+    // n! / (n - k)! of the degree n.
+    let mut found = [1.0; 4];
+    for order in 1..4 {
+        found[order] = found[order - 1] * (N as f64 - order as f64);
+    }
+    for last in (0..N).rev() {
+        match last {
+            3 => found[3] *= row[3] - 3.0 * (row[2] - row[1]) - row[0],
+            2 => found[2] *= row[2] - 2.0 * row[1] + row[0],
+            1 => found[1] *= row[1] - row[0],
+            0 => found[0] *= row[0],
+            _ => {}
+        }
+        for k in 0..last {
+            row[k] += s * (row[k + 1] - row[k]);
+        }
+    }
+    found
 }
 
 #[cfg(test)]
@@ -115,7 +161,7 @@ mod tests {
     #[test]
     fn motion_is_that_of_the_chain_rule() {
         let path = [&[0.0, 0.0, 0.0, 1.0][..], &[1.0, 0.0, 0.0], &[0.0, 2.0], &[5.0]].map(Bernstein::new);
-        let segment = Segment { path, slowness: Bernstein::new(&[1.0, 1.0, 4.0]) };
+        let segment = Segment::new(&path, &Bernstein::new(&[1.0, 1.0, 4.0]));
         assert!((segment.duration() - 2.0).abs() < 1e-14);
         for s in [0.0_f64, 0.2, 0.5, 0.9] {
             let (w, w1) = (1.0 + 3.0 * s * s, 6.0 * s);
