@@ -2,6 +2,7 @@
 //! mission that runs them all.
 
 pub mod adapters;
+pub mod air;
 pub mod appearance;
 #[cfg(all(feature = "autopilot", unix))]
 pub mod autopilot;

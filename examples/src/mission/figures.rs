@@ -184,9 +184,7 @@ fn normal_deviations(mission: &Mission) -> Deviations {
             if f.plan.reachable[k] {
                 ours.push(target.normal_deviation(&f.plan.nozzle[k].position));
             }
-            if f.smoothing.reachable[k] {
-                smoothing.push(target.normal_deviation(&f.smoothing.nozzle[k].position));
-            }
+            smoothing.extend(f.smoothing_deviations[k]);
         }
     }
     Deviations {

@@ -3,6 +3,7 @@
 use paint_planner::Plan;
 use paint_planner::mission::{Route, Turn};
 use paint_planner::onboard::sorties;
+use paint_planner::plan::{Planner as _, SmoothingPlanner};
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{Faults, Reference};
 use paint_sim::{FlightSettings, Shot};
@@ -19,6 +20,7 @@ use super::settings::MissionSettings;
 use super::simulated_flight::reference;
 use super::sorties::{FlownPiece, Sorties, in_pieces};
 use super::spray_flights::FlownPaint;
+use crate::adapters::MeshSurface;
 use crate::onboard::{LocalisationFigures, Piece};
 use crate::progress::Stage;
 use crate::simulated_sensors::SHOT_STEP;
@@ -34,8 +36,8 @@ pub struct LayerFlight {
     pub route: Route,
     /// The plan.
     pub plan: Plan,
-    /// The baseline planner on the same targets.
-    pub smoothing: Plan,
+    /// How far the nozzle is from the normal of each target that the baseline planner serves.
+    pub(super) smoothing_deviations: Vec<Option<f64>>,
     /// Flown with the localisation that was chosen: the flight whose paint counts, twenty times a second.
     pub flight: FlightLog,
     /// What it sprayed, with times, s; nothing once that is on the surface.
@@ -102,7 +104,7 @@ pub(super) fn fly(
     let mut faulty = task.settings.clone();
     let (begun, coat) = (before.iter().map(LayerFlight::end).fold(0.0, f64::max), planned.coat_duration());
     let coats = std::iter::repeat_n(planned.layers, planned.coats).flatten();
-    for (k, PlannedLayer { route, plan, smoothing, turn, start }) in coats.enumerate() {
+    for (k, PlannedLayer { route, plan, turn, start }) in coats.enumerate() {
         if let Some(grounded) = &mut grounded {
             grounded.left_s += plan.trajectory.duration();
             continue;
@@ -113,6 +115,7 @@ pub(super) fn fly(
             faulty.faults = Faults::default();
             faulty.sensor_faults.clear();
         }
+        let smoothing = smoothing(task, &route)?;
         let mut told = Sorties::default();
         let sprayed: Vec<&LayerFlight> = before.iter().chain(&flights).collect();
         let counted = || {
@@ -127,15 +130,15 @@ pub(super) fn fly(
                 let left_s = ended.as_ref().map_or(0.0, |ended| ended.left_s);
                 grounded = ended;
                 flights.push(LayerFlight {
-                    route,
                     plan,
-                    smoothing,
+                    smoothing_deviations: deviations(&route, &smoothing),
                     flight,
                     shots,
                     landed,
                     localisation,
                     sorties,
                     left_s,
+                    route,
                     turn,
                     start: begun + (k / each) as f64 * coat + start,
                     on_dry: layer > 0 && k % each == 0,
@@ -152,6 +155,18 @@ pub(super) fn fly(
     let times = if longest > COMPARED { ", two more times for half an hour of each flight" } else { ", three times" };
     stage.done(&format!("{:.0} min in the air{times}", seconds / 60.0));
     Ok(Flown { layers: flights, grounded })
+}
+
+/// The plan of the baseline on the same targets.
+fn smoothing(task: &PaintingTask, route: &Route) -> Result<Plan, MissionError> {
+    let mesh = MeshSurface(&task.surface.world);
+    Ok(SmoothingPlanner.plan(&route.targets, &mesh, task.planned_robot.tool(), &task.settings.planner)?)
+}
+
+/// How far the nozzle is from the normal of each target that is served.
+fn deviations(route: &Route, plan: &Plan) -> Vec<Option<f64>> {
+    let nozzles = route.targets.iter().zip(&plan.nozzle).zip(&plan.reachable);
+    nozzles.map(|((target, nozzle), served)| served.then(|| target.normal_deviation(&nozzle.position))).collect()
 }
 
 /// The flight whose paint counts, in as many sorties as tank and battery ask for; each has wind of its own, and finds itself anew before the

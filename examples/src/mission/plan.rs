@@ -6,7 +6,6 @@ use paint_planner::mission::{
     LiftedStrokes, MissionFlight, MissionPlan, MissionPlanner, NoRehearsal, Rehearsal, Route, Spray, TargetOutcomes,
     Turn,
 };
-use paint_planner::plan::SmoothingPlanner;
 use paint_planner::{Error, Plan, Planner, Settings, Surface, Target, Tool};
 use std::cell::Cell;
 use std::time::Instant;
@@ -33,12 +32,16 @@ pub struct PlannedLayer {
     pub route: Route,
     /// The plan.
     pub plan: Plan,
-    /// The baseline's plan on the same targets.
-    pub(super) smoothing: Plan,
     /// Who flies it.
     pub turn: Turn,
     /// When it begins, s after the first of its coat.
     pub(super) start: f64,
+}
+
+impl From<MissionFlight> for PlannedLayer {
+    fn from(MissionFlight { route, plan, turn, start, .. }: MissionFlight) -> Self {
+        Self { route, plan, turn, start }
+    }
 }
 
 impl PlannedLayer {
@@ -169,7 +172,7 @@ pub(super) fn replan(task: &PaintingTask, draft: &mut Draft) -> Result<(), Missi
     Ok(())
 }
 
-/// The flights with what they are compared with.
+/// The flights as they are flown: in coats that do not run, each when no other is in its way.
 pub(super) fn finish(task: &PaintingTask, mut draft: Draft) -> Result<Planned, MissionError> {
     let (coats, _) = coats(task);
     if coats > 1 {
@@ -181,23 +184,16 @@ pub(super) fn finish(task: &PaintingTask, mut draft: Draft) -> Result<Planned, M
     let Draft { mut mission, seconds } = draft;
     mission.schedule(&task.settings.team)?;
     say_of_robots_without_room(task, &mission);
-    let PaintingTask { layers, surface, planned_robot, settings, .. } = task;
-    let stage = Stage::start("compare");
-    let mesh = MeshSurface(&surface.world);
-    let mut planned = Planned {
+    let PaintingTask { layers, settings, .. } = task;
+    let planned = Planned {
         coats,
         seconds,
         unreachable_paint: mission.refused_volume,
         kept_off: mission.flights.iter().map(MissionFlight::kept_off).sum(),
         left_bare: mission.flights.iter().map(MissionFlight::excluded).sum(),
         outcomes: mission.outcomes(),
-        layers: Vec::with_capacity(mission.flights.len()),
+        layers: mission.flights.into_iter().map(PlannedLayer::from).collect(),
     };
-    for flight in mission.flights {
-        let smoothing = SmoothingPlanner.plan(&flight.route.targets, &mesh, planned_robot.tool(), &settings.planner)?;
-        let MissionFlight { route, plan, turn, start, .. } = flight;
-        planned.layers.push(PlannedLayer { route, plan, smoothing, turn, start });
-    }
     let metres: f64 = planned.layers.iter().map(|layer| layer.plan.path_length()).sum();
     let rehearsed = match (planned.kept_off, planned.left_bare) {
         _ if settings.check_simulated().is_err() => {
@@ -215,7 +211,11 @@ pub(super) fn finish(task: &PaintingTask, mut draft: Draft) -> Result<Planned, M
         0 => String::new(),
         more => format!(", {more} of {} flights for what another gave up", planned.layers.len()),
     };
-    stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre{again}{rehearsed}", 1e3 * planned.seconds / metres));
+    say!(
+        "{}: {metres:.0} m of path, {:.1} ms per metre{again}{rehearsed}",
+        task.paint.name,
+        1e3 * planned.seconds / metres
+    );
     Ok(planned)
 }
 

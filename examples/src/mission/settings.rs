@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::MissionError;
 use super::planner_choice::PlannerChoice;
+use crate::air::MovingAir;
 use crate::light::Light;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
@@ -39,6 +40,9 @@ pub struct MissionSettings {
     /// How the wall soaks up the wet paint's solvent. Default sealed.
     #[serde(skip_serializing_if = "is_sealed")]
     pub ground: Ground,
+    /// The air in which the spray drifts. Default: it flies straight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub air: Option<MovingAir>,
     /// Where a picture lies.
     pub placement: PicturePlacement,
     /// From where the design is thrown onto the surface; `None` lays it over the chart.
@@ -207,6 +211,7 @@ impl Default for MissionSettings {
             spot: 0.025,
             paint: PaintName::default(),
             ground: Ground::default(),
+            air: None,
             memory_gib: 8.0,
             placement: PicturePlacement::default(),
             viewpoint: None,

@@ -2,6 +2,7 @@
 
 use paint_net::Image;
 use paint_sim::film::wet::{Side, WetFilm};
+use paint_sim::spray::air::drifted;
 use paint_sim::{Film, Shot, Texel};
 
 use super::error::MissionError;
@@ -53,8 +54,15 @@ impl WetSurface {
             let before = shots.len() - rest.len();
             rest = later;
             let now: Vec<Shot> = now.iter().map(|(_, shot)| *shot).collect();
-            let told = &mut |done: usize, _| progress(before + done);
-            self.film.deposit(&now, &spray_model(settings), task.met(), settings.threads, told)?;
+            if let Some(moving) = settings.air {
+                let (spray, air) = (spray_model(settings), moving.air());
+                let sprays = drifted(&now, &spray, &moving.droplets, task.met(), &mut |_| air)?;
+                self.film.deposit_each(&sprays, task.met(), settings.threads)?;
+                progress(before + now.len());
+            } else {
+                let told = &mut |done: usize, _| progress(before + done);
+                self.film.deposit(&now, &spray_model(settings), task.met(), settings.threads, told)?;
+            }
         }
         Ok(())
     }
@@ -172,8 +180,11 @@ mod tests {
     use super::super::settings::MissionSettings;
     use super::super::test_panel;
     use super::*;
+    use crate::air::MovingAir;
     use crate::design::Design;
     use crate::region::Scene;
+    use nalgebra::{Point3, Vector3};
+    use paint_sim::spray::air::{Drift, drift};
 
     fn task() -> PaintingTask {
         let settings = MissionSettings { threads: 1, ..MissionSettings::default() };
@@ -205,6 +216,30 @@ mod tests {
         assert!(in_one.ground_times[0] == 0.0 && in_coats.ground_times[0] > 60.0);
         let [one, two] = [&in_one, &in_coats].map(|mission| mission.film.mass_balance().deposited as f64);
         assert!((two / one - 1.0).abs() < 0.02, "{two} {one}");
+    }
+
+    /// A shot before the middle of the wall in wind along it lands where the simulation has the spots of its droplets.
+    #[test]
+    fn spray_drifts_in_the_air_of_the_settings() {
+        let sprayed = |air: Option<MovingAir>| {
+            let mut task = task();
+            task.settings.air = air;
+            let shot = Shot { origin: Point3::new(-0.1, 0.0, 2.0), axis: Vector3::x_axis(), volume: 2e-9 };
+            let mut surface = WetSurface::new(&task).unwrap();
+            surface.spray(&[(0.0, shot)], &task, &|_| ()).unwrap();
+            let film = surface.film().film();
+            let paint: Vec<f64> = film.volumes().iter().map(|volume| *volume as f64).collect();
+            let moment = paint.iter().zip(film.texels()).map(|(v, texel)| v * texel.point.y).sum::<f64>();
+            (moment / paint.iter().sum::<f64>(), spray_model(&task.settings))
+        };
+        let air = MovingAir { wind: [0.0, 2.0, 0.0], ..MovingAir::default() };
+        let ((still, spray), (blown, _)) = (sprayed(None), sprayed(Some(air)));
+        assert!(still.abs() < 1e-4, "{still}");
+        let Drift { main, fog, .. } = drift(&air.droplets, &spray, 0.1, [0.0, 2.0], 0.0).unwrap();
+        let spots = std::iter::once(main).chain(fog);
+        let (shift, share) = spots.fold((0.0, 0.0), |(s, n), spot| (s + spot.share * spot.shift, n + spot.share));
+        assert!(shift > 2e-3 && (blown - shift / share).abs() < 5e-4, "{blown} {shift} {share}");
+        assert_eq!(sprayed(Some(MovingAir::default())).0, still);
     }
 
     /// On one chart the sides are those of the grid; every texel has four, and what lies beyond is a neighbour.

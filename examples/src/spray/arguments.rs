@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 
+use crate::air::{MovingAir, parse_wind};
 use crate::mesh_frame::MeshScale;
 use crate::mission_arguments::ShowingArguments;
 use crate::wall::Wall;
@@ -43,6 +44,9 @@ pub struct Arguments {
     /// Standard deviation of the spray 10 cm before the nozzle, metres
     #[arg(long, value_name = "METRES", value_parser = positive, default_value = "0.025")]
     pub spot: f64,
+    /// Wind in which the spray drifts, m/s in the coordinates of the mesh, and the deviation of its fluctuations [default: it flies straight]
+    #[arg(long, value_name = "X,Y,Z[,TURBULENCE]", value_parser = parse_wind, allow_negative_numbers = true)]
+    pub wind: Option<MovingAir>,
     /// How it is shown.
     #[command(flatten)]
     pub showing: ShowingArguments,

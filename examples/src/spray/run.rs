@@ -75,6 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<(), SprayError> {
     let defaults = MissionSettings::default();
     let threads = arguments.threads.map_or(defaults.threads, usize::from);
     let mut settings = MissionSettings { texel: arguments.texel, spot: arguments.spot, threads, ..defaults };
+    settings.air = arguments.wind;
     arguments.showing.apply(&mut settings.show);
     let wall = arguments.wall.substrate().map_err(crate::mission::MissionError::from)?;
     let (paint_name, density) = (paint.name.clone(), paint.liquid.density);

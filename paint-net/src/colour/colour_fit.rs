@@ -133,6 +133,9 @@ struct Look {
     paint: f64,
 }
 
+/// What becomes of the weight, look and slopes of a pixel: a value for each paint, and one for the sum.
+type OfPixel<'a> = dyn Fn(f64, &Pixel, &Look, &[[f64; 3]], &mut [f32]) -> f64 + Sync + 'a;
+
 /// Depths of all paints on all pixels, then what pulls at them, in single precision as the model of the colours.
 struct Planes<'a> {
     fit: &'a ColourFit<'a>,
@@ -187,7 +190,7 @@ impl<'a> Planes<'a> {
     }
 
     /// Puts what `of` makes of the weight, colour and slopes of each pixel into `pulls`, paint after paint; the sum of what it returns.
-    fn on_each_pixel(&mut self, of: &(dyn Fn(f64, &Pixel, &Look, &[[f64; 3]], &mut [f32]) -> f64 + Sync)) -> f64 {
+    fn on_each_pixel(&mut self, of: &OfPixel) -> f64 {
         let (n, fit) = (self.depths.len(), self.fit);
         let of_block = |block: &&[Pixel]| {
             let (mut values, mut sum) = (vec![0.0; n * block.len()], 0.0);

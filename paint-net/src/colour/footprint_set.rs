@@ -131,7 +131,9 @@ impl FootprintSet {
     /// [`Error::Pixel`] for a footprint beside the pixels.
     pub(super) fn coarse(&self, group: &[u32], groups: usize) -> Result<Self, Error> {
         let mut sizes = vec![0.0_f32; groups];
-        group.iter().for_each(|&g| sizes[g as usize] += 1.0);
+        for &g in group {
+            sizes[g as usize] += 1.0;
+        }
         let mean = |(pixel, depth): (usize, f32)| (group[pixel], depth / sizes[group[pixel] as usize]);
         Self::of((0..self.len()).map(|spray| self.iter(spray).map(mean).collect()))
     }
@@ -186,7 +188,9 @@ mod tests {
         let field: Vec<f32> = (0..31).map(|k| (1.0 + k as f32).sqrt()).collect();
         for (spray, footprint) in footprints().iter().enumerate() {
             let mut expected = [0.0_f32; 31];
-            footprint.iter().for_each(|&(pixel, depth)| expected[pixel as usize] += depth);
+            for &(pixel, depth) in footprint {
+                expected[pixel as usize] += depth;
+            }
             let mut plane = [0.0_f32; 31];
             set.deposit(spray, 2.0, &mut plane);
             let deepest = expected.iter().fold(0.0_f32, |a, b| a.max(*b));
