@@ -115,7 +115,6 @@ pub(super) fn fly(
             faulty.faults = Faults::default();
             faulty.sensor_faults.clear();
         }
-        let smoothing = smoothing(task, &route)?;
         let mut told = Sorties::default();
         let sprayed: Vec<&LayerFlight> = before.iter().chain(&flights).collect();
         let counted = || {
@@ -124,14 +123,18 @@ pub(super) fn fly(
             let landed = flight.samples.last().map_or(0.0, |sample| sample.time);
             Ok((flight.timed_shots(SHOT_STEP), landed, flight.thinned(KEPT_STEP)))
         };
-        match fly_beside([&plan, &smoothing], task.met(), &task.robot, &faulty, layer as u64, counted) {
-            Ok(((shots, landed, flight), [slam, locked])) => {
+        let flown = smoothing(task, &route).and_then(|smoothing| {
+            let flown = fly_beside([&plan, &smoothing], task.met(), &task.robot, &faulty, layer as u64, counted)?;
+            Ok((deviations(&route, &smoothing), flown))
+        });
+        match flown {
+            Ok((smoothing_deviations, ((shots, landed, flight), [slam, locked]))) => {
                 let Sorties { localisation, count: sorties, ended } = told;
                 let left_s = ended.as_ref().map_or(0.0, |ended| ended.left_s);
                 grounded = ended;
                 flights.push(LayerFlight {
                     plan,
-                    smoothing_deviations: deviations(&route, &smoothing),
+                    smoothing_deviations,
                     flight,
                     shots,
                     landed,
