@@ -44,7 +44,7 @@ pub struct Arguments {
     /// Standard deviation of the spray 10 cm before the nozzle, metres
     #[arg(long, value_name = "METRES", value_parser = positive, default_value = "0.025")]
     pub spot: f64,
-    /// Wind in which the spray drifts, m/s in the coordinates of the mesh, and the deviation of its fluctuations [default: it flies straight]
+    /// Wind in which the spray drifts, m/s in the coordinates of the motion, and the deviation of its fluctuations [default: it flies straight]
     #[arg(long, value_name = "X,Y,Z[,TURBULENCE]", value_parser = parse_wind, allow_negative_numbers = true)]
     pub wind: Option<MovingAir>,
     /// How it is shown.

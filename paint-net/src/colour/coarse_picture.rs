@@ -45,6 +45,10 @@ impl CoarsePicture {
             return Err(Error::Mismatch { what: "pixels under footprints", found: (under, 1), expected: (pixels, 1) });
         }
         let groups = group.iter().max().map_or(0, |last| *last as usize + 1);
+        let range = "a pixel in each of the coarse pixels up to the last";
+        if groups > pixels {
+            return Err(Error::Pixel { what: "coarse pixel", x: groups - 1, y: 0, value: 0.0, range });
+        }
         let mut first = vec![usize::MAX; groups];
         let (mut wanted, mut weight) = (vec![[0.0; 3]; groups], vec![0.0; groups]);
         for (k, &g) in group.iter().enumerate().rev() {
@@ -54,7 +58,6 @@ impl CoarsePicture {
             wanted[g].iter_mut().zip(fit.wanted[k]).for_each(|(sum, value)| *sum += fit.weight[k] * value);
         }
         if let Some(empty) = first.iter().position(|k| *k == usize::MAX) {
-            let range = "a pixel in each of the coarse pixels up to the last";
             return Err(Error::Pixel { what: "coarse pixel", x: empty, y: 0, value: 0.0, range });
         }
         for ((wanted, weight), &k) in wanted.iter_mut().zip(&weight).zip(&first) {

@@ -8,8 +8,8 @@ const STEPS: f32 = 65_535.0;
 /// A gap of as many pixels takes less room than the beginning of another run.
 const GAP: usize = 4;
 
-/// [Footprints](SurfaceFootprint) of many sprays as runs of neighbouring pixels, depths in 65,535 steps of a footprint's deepest place: a third of the
-/// memory of lists, and sums over them run along the pixels. Ours.
+/// [Footprints](SurfaceFootprint) of many sprays as runs of neighbouring pixels, depths in 65,535 steps of a footprint's deepest place: two bytes a
+/// pixel instead of eight, and sums over them run along the pixels. Ours.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FootprintSet {
     sprays: Vec<SprayRuns>,
@@ -50,6 +50,10 @@ impl FootprintSet {
         });
         footprint.retain(|(_, depth)| *depth > 0.0);
         let deepest = footprint.iter().fold(0.0, |most: f32, (_, depth)| most.max(*depth));
+        if deepest.is_infinite() {
+            let (value, range) = (f64::from(deepest), "depths of a pixel with a finite sum");
+            return Err(Error::Pixel { what: "footprint", x: 0, y: 0, value, range });
+        }
         self.sprays.push(SprayRuns { run: self.runs.len(), depth: self.depths.len(), step: deepest / STEPS });
         let first = self.runs.len();
         for (pixel, depth) in footprint {
@@ -125,10 +129,10 @@ impl FootprintSet {
         f64::from(self.sprays[spray].step * sum)
     }
 
-    /// The same footprints on a coarser picture: the mean over the pixels in each of its `groups`, `group` of each pixel.
+    /// The same footprints on a coarser picture: the mean over the pixels in each of its `groups`, `group` of each pixel. None lies beside those.
     ///
     /// # Errors
-    /// [`Error::Pixel`] for a footprint beside the pixels.
+    /// As [`push`](Self::push).
     pub(super) fn coarse(&self, group: &[u32], groups: usize) -> Result<Self, Error> {
         let mut sizes = vec![0.0_f32; groups];
         for &g in group {
@@ -214,5 +218,6 @@ mod tests {
         for depth in [-1.0, f32::NAN, f32::INFINITY] {
             assert!(matches!(FootprintSet::of([vec![(3, depth)]]), Err(Error::Pixel { x: 3, .. })));
         }
+        assert!(FootprintSet::of([vec![(3, f32::MAX), (3, f32::MAX)]]).is_err());
     }
 }

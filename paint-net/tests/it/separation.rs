@@ -282,8 +282,8 @@ fn of_paints_that_look_alike_one_is_left_out() {
     assert_eq!(left_out(&volumes), left_out(&on_pairs));
     let both = depths[0].iter().zip(&depths[1]).map(|(a, b)| a + b);
     assert!(both.skip(8).take(64).all(|depth| (depth - 0.8).abs() < 0.02), "{depths:?}");
-    let gap = [0, 2].repeat(40);
-    for coarse in [&pairs[1..], &gap] {
+    let (gap, far) = ([0, 2].repeat(40), [u32::MAX; 80]);
+    for coarse in [&pairs[1..], &gap, &far] {
         assert!(SparseColourFit { coarse, ..sparse }.solve(&mut volumes, &mut |_| ()).is_err());
     }
     let short = SparseColourFit { rows: &rows[..1], ..sparse }.solve(&mut volumes, &mut |_| ());
