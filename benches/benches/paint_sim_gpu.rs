@@ -62,7 +62,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let shots: Vec<Shot> = rock::stroke(&surface, SHOTS).iter().map(shot).collect();
     let bare = Film::new(surface.film_texels().0)?;
-    let sprayer = bare.gpu_spray(&gpu, &options)?;
+    let sprayer = bare.gpu_spray(&options)?;
     let on_processor = || {
         let mut film = bare.layer();
         film.deposit(&shots, &spray, &surface.world, 1, &mut |_, _| ())?;
@@ -70,7 +70,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let on_device = || {
         let mut film = bare.layer();
-        film.deposit_on(&sprayer, &shots, &spray, 1, &mut |_, _| ())?;
+        film.deposit_on(&sprayer, &shots, &spray, &gpu, 1, &mut |_, _| ())?;
         Ok((film.volumes().to_vec(), film.mass_balance()))
     };
     print(&format!("{SHOTS} shots on {} texels", bare.texels().len()), median_ms(on_processor)?, median_ms(on_device)?);

@@ -6,8 +6,6 @@ use crate::error::{Error, check_positive, check_range};
 #[cfg(feature = "gpu")]
 use crate::gpu::GpuOptions;
 use crate::spray::{QUANTUM, Shot, SprayModel};
-#[cfg(feature = "gpu")]
-use crate::surface::GpuSurface;
 use crate::surface::Surface;
 use crate::trace::{event, span};
 
@@ -164,12 +162,13 @@ impl Film {
     /// # Errors
     /// [`Error::Gpu`]: there is none, it refuses, or it cannot hold the texels.
     #[cfg(feature = "gpu")]
-    pub fn gpu_spray<'a>(&self, surface: &'a GpuSurface<'a>, options: &GpuOptions) -> Result<GpuSpray<'a>, Error> {
-        GpuSpray::new(&self.index, surface, options)
+    pub fn gpu_spray(&self, options: &GpuOptions) -> Result<GpuSpray, Error> {
+        GpuSpray::new(&self.index, options)
     }
 
-    /// [`Film::deposit`] with the GPU that knows this film's texels, on the surface that it knows: the same paint on every texel, to the
-    /// femtolitre, and the same mass balance. Where the GPU fails the processor goes on with `threads`; [`GpuSpray::fault`] tells.
+    /// [`Film::deposit`] with the GPU that knows this film's texels: the same paint on every texel, to the femtolitre, and the same mass
+    /// balance. The shadows are those of `surface`, which may be on the GPU as well ([`GpuSurface`](crate::surface::GpuSurface)). Where the GPU
+    /// fails the processor goes on with `threads`; [`GpuSpray::fault`] tells.
     ///
     /// # Errors
     /// As [`Film::deposit`], and [`Error::Gpu`] where the GPU knows the texels of another film.
@@ -179,15 +178,29 @@ impl Film {
         gpu: &GpuSpray,
         shots: &[Shot],
         spray: &SprayModel,
+        surface: &dyn Surface,
         threads: usize,
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<MassBalance, Error> {
+        self.deposit_on_told(gpu, (shots, spray, surface), threads, &mut |_, _| (), progress)
+    }
+
+    /// The same, and tells `landed` how much comes onto which texel.
+    #[cfg(feature = "gpu")]
+    fn deposit_on_told(
+        &mut self,
+        gpu: &GpuSpray,
+        (shots, spray, surface): (&[Shot], &SprayModel, &dyn Surface),
+        threads: usize,
+        landed: &mut dyn FnMut(u32, u64),
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<MassBalance, Error> {
         if !gpu.knows(&self.index) {
             return Err(Error::Gpu { what: "it knows the texels of another film".into() });
         }
         let emitted = check_call(shots, spray, threads)?;
-        let hits = |batch: &[Shot]| gpu.deposit_batch(batch, spray, threads);
-        self.deposit_hits(shots, emitted, &hits, &mut |_, _| (), progress)
+        let hits = |batch: &[Shot]| gpu.deposit_batch(batch, spray, surface, threads);
+        self.deposit_hits(shots, emitted, &hits, landed, progress)
     }
 
     /// Books what `hits` says of every batch.

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use nalgebra::{Point3, Rotation3, Vector3};
-use paint_sim::Camera;
-use paint_sim::render::Shading;
+use paint_sim::render::{Frame, Shading};
 use paint_sim::surface::Hit;
+use paint_sim::{Camera, Surface};
 
 use super::error::MissionError;
 use super::painting_task::PaintingTask;
-use super::view::{camera, extent, farther, fitted, front, picture_of, smaller, view};
+use super::view::{camera, extent, farther, fitted, front, picture_of, smaller, view_of};
 use crate::pictures::{Tile, save_contact_sheet};
 use crate::say;
 
@@ -31,23 +31,48 @@ const FAR: f64 = 2.2;
 /// How a place of the surface looks.
 type Shade<'a> = &'a (dyn Fn(&Hit) -> Shading + Sync);
 
+/// What is seen.
+#[derive(Clone, Copy)]
+struct Seen<'a> {
+    task: &'a PaintingTask,
+    surface: &'a dyn Surface,
+    shade: Shade<'a>,
+}
+
+impl Seen<'_> {
+    fn from(self, camera: &Camera) -> Result<Frame, MissionError> {
+        view_of(self.surface, self.task, camera, self.shade)
+    }
+}
+
 /// Writes `painted_view.png`; in a light that was asked for also `views.png`; `turntable.png` if that was.
 pub(super) fn save_painted_views(task: &PaintingTask, shade: Shade, folder: &Path) -> Result<(), MissionError> {
+    save_painted_views_of(&task.surface.world, task, shade, folder)
+}
+
+/// The same of the task's surface as a device has it.
+pub(super) fn save_painted_views_of(
+    surface: &dyn Surface,
+    task: &PaintingTask,
+    shade: Shade,
+    folder: &Path,
+) -> Result<(), MissionError> {
+    let seen = Seen { task, surface, shade };
     let points: Vec<Point3<f64>> = task.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
-    let frame = view(task, &camera(task, &points)?, shade)?;
+    let frame = seen.from(&camera(task, &points)?)?;
     picture_of(&frame).save(&folder.join("painted_view.png"))?;
     let show = &task.settings.show;
     if let Some(light) = show.light {
         let percent = 100.0 * frame.clipped as f64 / frame.colour.len() as f64;
         say!("light {light}: {percent:.1} % of painted_view.png is brighter than it can show");
-        save_views(task, &points, shade, folder)?;
+        save_views(seen, &points, folder)?;
     }
-    show.turntable.map_or(Ok(()), |count| save_turntable(task, &points, shade, count, folder))
+    show.turntable.map_or(Ok(()), |count| save_turntable(seen, &points, count, folder))
 }
 
 /// From the left, the front and the right; from near and far.
-fn save_views(task: &PaintingTask, points: &[Point3<f64>], shade: Shade, folder: &Path) -> Result<(), MissionError> {
-    let centre = middle(points);
+fn save_views(seen: Seen, points: &[Point3<f64>], folder: &Path) -> Result<(), MissionError> {
+    let (task, centre) = (seen.task, middle(points));
     let before = turned(task, points, 0.0)?;
     // A positive angle leads to the right of who stands before it.
     let rows = [
@@ -60,7 +85,7 @@ fn save_views(task: &PaintingTask, points: &[Point3<f64>], shade: Shade, folder:
         [("near", farther(&before, &centre, NEAR)), ("far", farther(&before, &centre, FAR))].to_vec(),
     ];
     let tile = |(caption, camera): &(&str, Camera)| -> Result<Tile, MissionError> {
-        let picture = picture_of(&view(task, &smaller(camera, SIDE), shade)?);
+        let picture = picture_of(&seen.from(&smaller(camera, SIDE))?);
         Ok(Tile { caption: (*caption).to_owned(), picture })
     };
     let sheet: Result<Vec<Vec<Tile>>, MissionError> = rows.iter().map(|row| row.iter().map(tile).collect()).collect();
@@ -68,18 +93,12 @@ fn save_views(task: &PaintingTask, points: &[Point3<f64>], shade: Shade, folder:
 }
 
 /// From places at equal angles: all around, or before a surface that has a front.
-fn save_turntable(
-    task: &PaintingTask,
-    points: &[Point3<f64>],
-    shade: Shade,
-    count: u16,
-    folder: &Path,
-) -> Result<(), MissionError> {
-    let mut tiles = Vec::new();
+fn save_turntable(seen: Seen, points: &[Point3<f64>], count: u16, folder: &Path) -> Result<(), MissionError> {
+    let (task, mut tiles) = (seen.task, Vec::new());
     for angle in angles(count, task.surface.facing().norm() > ONE_SIDED) {
         let camera = smaller(&turned(task, points, angle)?, TURNTABLE_SIDE);
         let caption = format!("{:.0}°", angle.to_degrees());
-        tiles.push(Tile { caption, picture: picture_of(&view(task, &camera, shade)?) });
+        tiles.push(Tile { caption, picture: picture_of(&seen.from(&camera)?) });
     }
     let columns = (1..=tiles.len()).find(|n| n * n >= tiles.len()).unwrap_or(1);
     let mut tiles = tiles.into_iter().peekable();

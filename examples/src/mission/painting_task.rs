@@ -102,7 +102,10 @@ impl PaintingTask {
     }
 
     /// The surface with what the robot reaches of it, before anything is wanted.
-    pub(super) fn undecided(name: &str, scene: &Scene, settings: MissionSettings) -> Result<Self, MissionError> {
+    ///
+    /// # Errors
+    /// A mesh that is no surface, settings out of range.
+    pub fn undecided(name: &str, scene: &Scene, settings: MissionSettings) -> Result<Self, MissionError> {
         let started = Instant::now();
         settings.check()?;
         let robot = Robot { tether: settings.constraints.tether, ..Robot::new(Ptu::new(settings.ptu)?) };
@@ -181,7 +184,10 @@ impl PaintingTask {
     }
 
     /// The same with another paint in the tank, on another wall.
-    pub(super) fn with_paint(self, paint: NamedPaint, wall: &Substrate) -> Result<Self, MissionError> {
+    ///
+    /// # Errors
+    /// A paint or wall without a colour.
+    pub fn with_paint(self, paint: NamedPaint, wall: &Substrate) -> Result<Self, MissionError> {
         Ok(Self { appearance: Appearance::new(&paint.paint, wall)?, paint, ..self })
     }
 

@@ -3,48 +3,38 @@
 use std::path::Path;
 
 use paint_sim::surface::Hit;
-use paint_sim::{Film, Shot, Substrate, TriangleSurface};
+use paint_sim::{Film, Shot};
 
 use super::error::MissionError;
 use super::mission_output::{page_colours, texture};
 use super::painted_mesh::save_painted_mesh;
-use super::painted_views::save_painted_views;
+use super::painted_views::save_painted_views_of;
 use super::painting_task::PaintingTask;
-use super::settings::MissionSettings;
 use super::shading::shading;
-use super::wet_surface::WetSurface;
-use crate::paint_set::NamedPaint;
+use super::spray_device::{SprayDevice, Sprayer};
+use super::wet_surface::{Deposit, WetSurface};
 use crate::progress::Stage;
-use crate::region::Scene;
 
 /// Pictures of the paint as it grows.
 const PICTURES: usize = 8;
 
 /// A surface with a film of one paint that grows shot by shot.
-pub struct SprayedFilm {
-    task: PaintingTask,
+pub struct SprayedFilm<'a> {
+    task: &'a PaintingTask,
     surface: WetSurface,
+    device: &'a SprayDevice<'a>,
+    sprayer: Sprayer,
 }
 
-impl SprayedFilm {
-    /// A bare surface. `name` is what reports call it.
+impl<'a> SprayedFilm<'a> {
+    /// The bare surface of a task, sprayed on a device that was opened for it.
     ///
     /// # Errors
-    /// A mesh that is no surface, settings out of range.
-    pub fn new(
-        name: &str,
-        scene: &Scene,
-        settings: MissionSettings,
-        paint: NamedPaint,
-        wall: &Substrate,
-    ) -> Result<Self, MissionError> {
-        let task = PaintingTask::undecided(name, scene, settings)?.with_paint(paint, wall)?;
-        Ok(Self { surface: WetSurface::new(&task)?, task })
-    }
-
-    /// Everything there is to hit.
-    pub fn world(&self) -> &TriangleSurface {
-        self.task.met()
+    /// Settings out of range, a GPU that cannot hold the texels.
+    pub fn new(task: &'a PaintingTask, device: &'a SprayDevice<'a>) -> Result<Self, MissionError> {
+        let surface = WetSurface::new(task)?;
+        let sprayer = device.sprayer(surface.film().film())?;
+        Ok(Self { task, surface, device, sprayer })
     }
 
     /// Sprays shots with their times of `duration` seconds, in their order, and leaves a picture after every eighth of it in `folder`.
@@ -53,14 +43,16 @@ impl SprayedFilm {
     /// Shots that the simulation refuses, a folder that cannot be written.
     pub fn spray(&mut self, shots: &[(f64, Shot)], duration: f64, folder: &Path) -> Result<(), MissionError> {
         let stage = Stage::start("spray");
+        let (task, device, sprayer) = (self.task, self.device, &self.sprayer);
         let mut rest = shots;
         for k in 1..=PICTURES {
             let until = duration * k as f64 / PICTURES as f64;
             let count = if k == PICTURES { rest.len() } else { rest.partition_point(|(time, _)| *time <= until) };
             let (now, later) = rest.split_at(count);
-            self.surface.spray(now, &self.task, &|_| ())?;
-            let depth = self.surface.depth(&self.task);
-            texture(&self.task, &depth).save(&folder.join(format!("painted_{k}_of_{PICTURES}.png")))?;
+            let deposit: Deposit = &|film, shots, told| device.deposit(sprayer, film, shots, task, told);
+            self.surface.spray_by(deposit, now, task, &|_| ())?;
+            let depth = self.surface.depth(task);
+            texture(task, &depth).save(&folder.join(format!("painted_{k}_of_{PICTURES}.png")))?;
             stage.share(k as f64 / PICTURES as f64);
             rest = later;
         }
@@ -72,6 +64,11 @@ impl SprayedFilm {
     /// The paint.
     fn film(&self) -> &Film {
         self.surface.film().film()
+    }
+
+    /// What a GPU has done, in words.
+    pub fn device_told(&self) -> Option<String> {
+        self.device.told(&self.sprayer)
     }
 
     /// Share by area of the painted surface from which paint has run.
@@ -105,9 +102,9 @@ impl SprayedFilm {
     /// # Errors
     /// A folder that cannot be written.
     pub fn save(&self, folder: &Path) -> Result<(), MissionError> {
-        let depth = self.surface.depth(&self.task);
-        texture(&self.task, &depth).save(&folder.join("painted.png"))?;
-        save_painted_mesh(&self.task, &page_colours(&self.task, &depth), folder)?;
-        save_painted_views(&self.task, &|hit: &Hit| shading(&self.task, &depth, hit), folder)
+        let (task, depth) = (self.task, self.surface.depth(self.task));
+        texture(task, &depth).save(&folder.join("painted.png"))?;
+        save_painted_mesh(task, &page_colours(task, &depth), folder)?;
+        save_painted_views_of(self.device.surface(), task, &|hit: &Hit| shading(task, &depth, hit), folder)
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_sim::render::{Frame, Lights, Shading};
 use paint_sim::surface::Hit;
-use paint_sim::{Camera, Surface as _, render};
+use paint_sim::{Camera, Surface, render};
 
 use super::error::MissionError;
 use super::painting_task::PaintingTask;
@@ -29,7 +29,17 @@ pub(super) fn view(
     camera: &Camera,
     shade: &(dyn Fn(&Hit) -> Shading + Sync),
 ) -> Result<Frame, MissionError> {
-    Ok(render(&task.surface.world, camera, shade, &lights(task, camera)?, 2, task.settings.threads)?)
+    view_of(&task.surface.world, task, camera, shade)
+}
+
+/// The same of the task's surface as a device has it.
+pub(super) fn view_of(
+    surface: &dyn Surface,
+    task: &PaintingTask,
+    camera: &Camera,
+    shade: &(dyn Fn(&Hit) -> Shading + Sync),
+) -> Result<Frame, MissionError> {
+    Ok(render(surface, camera, shade, &lights(task, camera)?, 2, task.settings.threads)?)
 }
 
 fn lights(task: &PaintingTask, camera: &Camera) -> Result<Lights, MissionError> {

@@ -18,6 +18,10 @@ const BELOW_SAG: f64 = 0.9;
 /// Share of the painted area that may run before another coat is flown over all of it.
 const SLIVER: f64 = 0.02;
 
+/// Brings shots onto a film, and says how many of them are done.
+pub(super) type Deposit<'a> =
+    &'a dyn Fn(&mut WetFilm, &[Shot], &mut dyn FnMut(usize, usize)) -> Result<(), paint_sim::Error>;
+
 /// The texels of a task with their paint.
 pub(super) struct WetSurface {
     film: WetFilm,
@@ -45,6 +49,20 @@ impl WetSurface {
         task: &PaintingTask,
         progress: &dyn Fn(usize),
     ) -> Result<(), MissionError> {
+        let (settings, spray) = (&task.settings, spray_model(&task.settings));
+        let deposit: Deposit =
+            &|film, shots, told| film.deposit(shots, &spray, task.met(), settings.threads, told).map(|_| ());
+        self.spray_by(deposit, shots, task, progress)
+    }
+
+    /// The same where shots that fly straight come onto the film by `deposit`.
+    pub(super) fn spray_by(
+        &mut self,
+        deposit: Deposit,
+        shots: &[(f64, Shot)],
+        task: &PaintingTask,
+        progress: &dyn Fn(usize),
+    ) -> Result<(), MissionError> {
         let settings = &task.settings;
         let mut rest = shots;
         while let Some(&(start, _)) = rest.first() {
@@ -60,8 +78,7 @@ impl WetSurface {
                 self.film.deposit_each(&sprays, task.met(), settings.threads)?;
                 progress(before + now.len());
             } else {
-                let told = &mut |done: usize, _| progress(before + done);
-                self.film.deposit(&now, &spray_model(settings), task.met(), settings.threads, told)?;
+                deposit(&mut self.film, &now, &mut |done, _| progress(before + done))?;
             }
         }
         Ok(())

@@ -47,6 +47,9 @@ pub struct Arguments {
     /// Wind in which the spray drifts, m/s in the coordinates of the motion, and the deviation of its fluctuations [default: it flies straight]
     #[arg(long, value_name = "X,Y,Z[,TURBULENCE]", value_parser = parse_wind, allow_negative_numbers = true)]
     pub wind: Option<MovingAir>,
+    /// Spray and cast the rays of the pictures on a GPU: the same files (needs the feature `gpu`; with --wind the processor sprays)
+    #[arg(long)]
+    pub gpu: bool,
     /// How it is shown.
     #[command(flatten)]
     pub showing: ShowingArguments,

@@ -41,6 +41,9 @@ pub enum SprayError {
     /// The surface, or the simulation on it.
     #[error(transparent)]
     Mission(#[from] MissionError),
+    /// A device was asked for that this program was built without.
+    #[error("--gpu: this program was built without it: build with --features gpu, or leave it out")]
+    NoGpu,
     /// The report.
     #[error(transparent)]
     Report(#[from] ReportError),

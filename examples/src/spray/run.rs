@@ -16,7 +16,7 @@ use super::read_mcap::read_mcap;
 use crate::mcap_messages::FIRST_BYTES;
 use crate::mesh_frame::{Subject, scale_of};
 use crate::mesh_io::read_mesh;
-use crate::mission::{MissionSettings, SprayedFilm};
+use crate::mission::{MissionSettings, PaintingTask, SprayDevice, SprayedFilm};
 use crate::mission_file::MissionFile;
 use crate::paint_set::{NamedPaint, artists_paints, read_paints};
 use crate::region::Scene;
@@ -79,9 +79,11 @@ pub fn run(arguments: &Arguments) -> Result<(), SprayError> {
     arguments.showing.apply(&mut settings.show);
     let wall = arguments.wall.substrate().map_err(crate::mission::MissionError::from)?;
     let (paint_name, density) = (paint.name.clone(), paint.liquid.density);
-    let mut sprayed = SprayedFilm::new(&name, &scene, settings, paint, &wall)?;
+    let task = PaintingTask::undecided(&name, &scene, settings)?.with_paint(paint, &wall)?;
+    let device = device(&task, arguments.gpu)?;
+    let mut sprayed = SprayedFilm::new(&task, &device)?;
     let shots = motion.shots(SHOT_STEP);
-    let (front, behind): (Vec<_>, Vec<_>) = shots.into_iter().partition(|(_, shot)| !is_behind(sprayed.world(), shot));
+    let (front, behind): (Vec<_>, Vec<_>) = shots.into_iter().partition(|(_, shot)| !is_behind(device.surface(), shot));
     let count = front.len() + behind.len();
     let share = behind.len() as f64 / count.max(1) as f64;
     if share > MOSTLY {
@@ -91,6 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<(), SprayError> {
     sprayed.spray(&front, motion.duration(), folder)?;
     let (balance, [mean, max]) = (sprayed.volumes(), sprayed.thickness());
     sprayed.save(folder)?;
+    sprayed.device_told().iter().for_each(|told| say!("{told}"));
     let report = SprayReport {
         version: env!("CARGO_PKG_VERSION"),
         surface: name,
@@ -186,6 +189,16 @@ fn surface(arguments: &Arguments) -> Result<(String, Scene), SprayError> {
     mesh.origin = [0.0; 3];
     let name = path.file_stem().map_or("Mesh".into(), |stem| stem.to_string_lossy());
     Ok((name.into_owned(), Scene::whole(mesh)))
+}
+
+fn device(task: &PaintingTask, gpu: bool) -> Result<SprayDevice<'_>, SprayError> {
+    if !gpu {
+        return Ok(SprayDevice::processor(task));
+    }
+    #[cfg(feature = "gpu")]
+    return Ok(SprayDevice::gpu(task)?);
+    #[cfg(not(feature = "gpu"))]
+    Err(SprayError::NoGpu)
 }
 
 /// Whether a shot begins inside of the surface or behind it: what it would meet looks away from it.

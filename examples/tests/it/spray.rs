@@ -177,3 +177,31 @@ fn flights_are_sprayed_again_from_what_they_leave() {
         }
     }
 }
+
+/// On a wall with a ledge that throws shadows: the same files as by the processor. A build without it says so.
+#[test]
+fn a_gpu_leaves_the_same_files() {
+    let s = Scratch::new("gpu");
+    let profile = [[0.0, 0.0], [0.0, 0.37], [-0.04, 0.37], [-0.04, 0.43], [0.0, 0.43], [0.0, 0.8]];
+    let corners = profile.iter().map(|[y, z]| format!("v 0 {y} {z}\nv 1.2 {y} {z}\n"));
+    let strip = |k: usize| format!("f {} {} {} {}\n", 2 * k + 1, 2 * k + 2, 2 * k + 4, 2 * k + 3);
+    s.write("ledge.obj", corners.chain((0..5).map(strip)).collect::<String>());
+    s.write("pass.csv", pass(&|_, row| Some(row)));
+    let (mesh, nozzle) = (s.path("ledge.obj"), s.path("pass.csv"));
+    let files = |more: &[&str]| {
+        let line = ["--mesh", &mesh, "--light", "noon"];
+        let report = sprayed(&s, &nozzle, &[&line, more].concat())?;
+        let read = |name| std::fs::read(s.0.join("out").join(name)).unwrap();
+        let pictures = ["painted.png", "painted.glb", "painted_view.png", "views.png"].map(read);
+        Ok::<_, SprayError>((report, pictures))
+    };
+    let (report, pictures) = files(&[]).unwrap();
+    match files(&["--gpu"]) {
+        Ok(on_gpu) => assert!(on_gpu == (report, pictures), "{}", on_gpu.0),
+        Err(SprayError::NoGpu) if !cfg!(feature = "gpu") => {}
+        Err(error) if std::env::var_os("PAINTCOPTER_REQUIRE_GPU").is_none_or(|v| v != "1") => {
+            println!("skipped: {error}");
+        }
+        Err(error) => panic!("{error}"),
+    }
+}

@@ -22,6 +22,8 @@ pub use wet_paint::WetPaint;
 use descents::Descents;
 use wet_state::WetState;
 
+#[cfg(feature = "gpu")]
+use super::GpuSpray;
 use super::{Film, MassBalance};
 use crate::error::{Error, check_not_negative};
 use crate::spray::{QUANTUM, Shot, SprayModel};
@@ -77,6 +79,24 @@ impl WetFilm {
     ) -> Result<MassBalance, Error> {
         let (film, mut landed) = self.0.filled();
         film.deposit_told(shots, spray, surface, threads, &mut landed, progress)
+    }
+
+    /// The same with a GPU that knows the film's texels; see [`Film::deposit_on`].
+    ///
+    /// # Errors
+    /// As [`Film::deposit_on`]; the film is then unchanged.
+    #[cfg(feature = "gpu")]
+    pub fn deposit_on(
+        &mut self,
+        gpu: &GpuSpray,
+        shots: &[Shot],
+        spray: &SprayModel,
+        surface: &dyn Surface,
+        threads: usize,
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<MassBalance, Error> {
+        let (film, mut landed) = self.0.filled();
+        film.deposit_on_told(gpu, (shots, spray, surface), threads, &mut landed, progress)
     }
 
     /// The same of shots with sprays of their own; see [`Film::deposit_each`].

@@ -85,12 +85,12 @@ fn every_texel_has_the_paint_of_the_processor() {
         let (surface, shots) = (rock(away), shots(away, 40));
         let Some(gpu) = available(GpuSurface::new(&surface, &options())) else { return };
         let mut film = Film::new(texels(away)).unwrap();
-        let spray_gpu = film.gpu_spray(&gpu, &options()).unwrap();
+        let spray_gpu = film.gpu_spray(&options()).unwrap();
         for (round, spray) in sprays().iter().enumerate() {
             let (mut expected, mut found) = (film.layer(), film.layer());
             let balance = expected.deposit(&shots, spray, &surface, 1, &mut |_, _| ()).unwrap();
             let before = gpu.rays();
-            let ours = found.deposit_on(&spray_gpu, &shots, spray, 1, &mut |_, _| ()).unwrap();
+            let ours = found.deposit_on(&spray_gpu, &shots, spray, &gpu, 1, &mut |_, _| ()).unwrap();
             let rays = gpu.rays();
             let (asked, left) = (rays.asked - before.asked, rays.left - before.left);
             println!("{away:?} {round}: {left} of {asked} shadow rays left to the processor, {balance:?}");
@@ -108,9 +108,9 @@ fn every_texel_has_the_paint_of_the_processor() {
         }
         assert!(spray_gpu.fault().is_none() && !spray_gpu.name().is_empty());
         // The film itself, not a layer of it, and one on other texels.
-        film.deposit_on(&spray_gpu, &shots[..1], &sprays()[0], 1, &mut |_, _| ()).unwrap();
+        film.deposit_on(&spray_gpu, &shots[..1], &sprays()[0], &gpu, 1, &mut |_, _| ()).unwrap();
         let mut other = Film::new(texels(away)).unwrap();
-        let refused = other.deposit_on(&spray_gpu, &shots, &sprays()[0], 1, &mut |_, _| ());
+        let refused = other.deposit_on(&spray_gpu, &shots, &sprays()[0], &gpu, 1, &mut |_, _| ());
         assert!(matches!(refused, Err(Error::Gpu { .. })));
     }
 }
@@ -125,9 +125,9 @@ fn large_work_goes_in_parts_and_what_fails_goes_to_the_processor() {
     let balance = expected.deposit(&shots, &spray, &surface, 1, &mut |_, _| ()).unwrap();
     for (most, fails) in [(20_000, false), (1100, true)] {
         let small = GpuOptions { max_buffer_bytes: most, ..options() };
-        let spray_gpu = film.gpu_spray(&gpu, &small).unwrap();
+        let spray_gpu = film.gpu_spray(&small).unwrap();
         let mut found = film.layer();
-        assert_eq!(found.deposit_on(&spray_gpu, &shots, &spray, 2, &mut |_, _| ()).unwrap(), balance);
+        assert_eq!(found.deposit_on(&spray_gpu, &shots, &spray, &gpu, 2, &mut |_, _| ()).unwrap(), balance);
         assert!(found.volumes() == expected.volumes());
         assert_eq!(spray_gpu.fault().is_some(), fails, "{most}");
     }
