@@ -26,8 +26,8 @@ pub fn decode_srgb8(encoded: u8) -> f64 {
 
 /// [`encode_srgb8`] in single precision, without a branch on the data.
 pub(crate) struct Srgb8Table {
-    /// Least number with a code of at least so much; beyond the last none.
-    least: [f32; 257],
+    /// Least number with a code above so much; with one above the last there is none.
+    next: [f32; 256],
     start: [u8; Srgb8Steps::PARTS + 1],
 }
 
@@ -40,8 +40,9 @@ impl Srgb8Table {
                 let rounded = least as f32;
                 if f64::from(rounded) < least { rounded.next_up() } else { rounded }
             };
-            let least = std::array::from_fn(|code| steps.least.get(code).map_or(f32::INFINITY, |&least| narrow(least)));
-            Srgb8Table { least, start: steps.start }
+            let next =
+                std::array::from_fn(|code| steps.least.get(code + 1).map_or(f32::INFINITY, |&least| narrow(least)));
+            Srgb8Table { next, start: steps.start }
         });
         &TABLE
     }
@@ -49,16 +50,14 @@ impl Srgb8Table {
     /// Least component with each code.
     #[cfg(feature = "gpu")]
     pub(crate) fn least(&self) -> impl Iterator<Item = f32> {
-        self.least.into_iter().take(256)
+        std::iter::once(0.0).chain(self.next).take(256)
     }
 
     /// The byte of a linear component, clipped.
     pub(crate) fn encode(&self, linear: f32) -> u8 {
         let linear = linear.clamp(0.0, 1.0);
         let start = self.start[(linear * Srgb8Steps::PARTS as f32) as usize];
-        let next = usize::from(start) + 1;
-        // At most two codes step within a part; the one after the last is never reached.
-        start + u8::from(linear >= self.least[next]) + u8::from(linear >= self.least[(next + 1).min(256)])
+        start + u8::from(linear >= self.next[usize::from(start)])
     }
 }
 
@@ -71,7 +70,7 @@ struct Srgb8Steps {
 }
 
 impl Srgb8Steps {
-    /// So many that at most two codes step within one.
+    /// More than the codes per unit where they are closest, 255 times 12.92: at most one steps within a part.
     const PARTS: usize = 4096;
 
     fn new() -> Self {
@@ -89,11 +88,9 @@ impl Srgb8Steps {
     }
 
     fn encode(&self, linear: f64) -> u8 {
-        let mut code = self.start[(linear * Self::PARTS as f64) as usize];
-        while code < u8::MAX && linear >= self.least[usize::from(code) + 1] {
-            code += 1;
-        }
-        code
+        let start = self.start[(linear * Self::PARTS as f64) as usize];
+        let next = self.least.get(usize::from(start) + 1);
+        start + u8::from(next.is_some_and(|&next| linear >= next))
     }
 }
 

@@ -1,8 +1,8 @@
 //! Colours of many films at once, in single precision.
 //!
-//! `unsafe`: a function that is compiled for AVX2 may only be called where the processor has it; that is asked before. Both versions do the
-//! same operations in the same order, so their results are the same bits.
-#![allow(unsafe_code, reason = "a function compiled for AVX2 is called where the processor has it")]
+//! `unsafe`: a function that is compiled for AVX2 and FMA may only be called where the processor has them; that is asked before. Both versions do
+//! the same operations in the same order, each rounded once, so their results are the same bits.
+#![allow(unsafe_code, reason = "a function compiled for AVX2 and FMA is called where the processor has them")]
 
 use super::{Paint, Substrate};
 use crate::colour::{BANDS, Srgb8Table, linear_srgb_weights};
@@ -52,6 +52,25 @@ pub(super) struct Band {
     pub(super) scattering: f32,
 }
 
+impl Band {
+    /// Reflectance of a film, its thickness not negative, on a ground that reflects `ground`. With `e = exp(-2 g d)`:
+    /// `R = (Rg (2 - l (1 + K/g)) + l S/g (1-Rg)) / (2 - l (1 - K/g) + l S/g (1-Rg))` and `l = 1-e`, Kubelka 1948 with its hyperbolic tangent
+    /// written out; `l` is summed without cancellation.
+    #[inline(always)]
+    fn over(&self, thickness: f32, ground: f32) -> f32 {
+        let power = (thickness * self.exponent).max(-126.0);
+        let whole = power + ROUNDING;
+        let part = power - (whole - ROUNDING);
+        let scale = f32::from_bits((whole.to_bits() << 23).wrapping_add(1.0_f32.to_bits()));
+        let [first @ .., last] = EXP2;
+        let rest = first.iter().rev().fold(last, |sum, c| part.mul_add(sum, *c)) * part;
+        let lost = (-scale).mul_add(rest, 1.0 - scale);
+        let scattered = lost * self.scattering * (1.0 - ground);
+        let [less, more] = self.sides.map(|side| (-lost).mul_add(side, 2.0));
+        ground.mul_add(less, scattered) / (more + scattered)
+    }
+}
+
 impl FilmColours {
     /// Of films of `paint` on `ground`.
     pub fn new(paint: &Paint, ground: &Substrate) -> Self {
@@ -99,7 +118,10 @@ impl FilmColours {
         for (first, colours) in (0..).step_by(LANES).zip(colours.chunks_mut(LANES)) {
             for (film, lanes) in lanes.iter_mut().enumerate() {
                 let at = film * places + first;
-                lanes[..colours.len()].copy_from_slice(&thickness[at..at + colours.len()]);
+                for (lane, thickness) in lanes.iter_mut().zip(&thickness[at..at + colours.len()]) {
+                    // `max` also takes what is not a number away.
+                    *lane = thickness.max(0.0);
+                }
             }
             let [red, green, blue] = linear(self, &lanes);
             for (lane, colour) in colours.iter_mut().enumerate() {
@@ -124,46 +146,36 @@ type Linear = fn(&FilmColours, &[[f32; LANES]]) -> [[f32; LANES]; 3];
 /// The best version that this processor runs.
 fn vectorised() -> Linear {
     #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has AVX2.
+    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+        // SAFETY: the processor has AVX2 and FMA.
         return |stack, thickness| unsafe { linear_avx2(stack, thickness) };
     }
     linear
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 fn linear_avx2(stack: &FilmColours, thickness: &[[f32; LANES]]) -> [[f32; LANES]; 3] {
     linear(stack, thickness)
 }
 
-/// Red, green and blue of films. With `e = exp(-2 g d)`:
-/// `R = (Rg (2 - l (1 + K/g)) + l S/g (1-Rg)) / (2 - l (1 - K/g) + l S/g (1-Rg))` and `l = 1-e`, Kubelka 1948 with its hyperbolic tangent
-/// written out; `l` is summed without cancellation. What a film reflects is the ground of the next.
+/// Red, green and blue of films. What a film reflects is the ground of the next.
 #[inline(always)]
 fn linear(stack: &FilmColours, thickness: &[[f32; LANES]]) -> [[f32; LANES]; 3] {
-    let mut colours = [[0.0; LANES]; 3];
-    for (j, (ground, weights)) in stack.grounds.iter().enumerate() {
-        let mut reflectance = [*ground; LANES];
-        for (film, thickness) in stack.films.iter().zip(thickness) {
-            let band = &film[j];
+    // Two loops: the constants of the first leave no register to the sums of the second.
+    let mut reflectance = stack.grounds.map(|(ground, _)| [ground; LANES]);
+    for (film, thickness) in stack.films.iter().zip(thickness) {
+        for (band, reflectance) in film.iter().zip(&mut reflectance) {
             for lane in 0..LANES {
-                // `max` also takes what is not a number away.
-                let power = (thickness[lane].max(0.0) * band.exponent).max(-126.0);
-                let whole = power + ROUNDING;
-                let part = power - (whole - ROUNDING);
-                let scale = f32::from_bits((whole.to_bits() << 23).wrapping_add(1.0_f32.to_bits()));
-                let [c0, c1, c2, c3, c4, c5] = EXP2;
-                let rest = scale * (part * (c0 + part * (c1 + part * (c2 + part * (c3 + part * (c4 + part * c5))))));
-                let lost = (1.0 - scale) - rest;
-                let scattered = lost * band.scattering * (1.0 - reflectance[lane]);
-                let [less, more] = band.sides.map(|side| 2.0 - lost * side);
-                reflectance[lane] = (reflectance[lane] * less + scattered) / (more + scattered);
+                reflectance[lane] = band.over(thickness[lane], reflectance[lane]);
             }
         }
-        for lane in 0..LANES {
-            for (colour, weight) in colours.iter_mut().zip(weights) {
-                colour[lane] += reflectance[lane] * weight;
+    }
+    let mut colours = [[0.0; LANES]; 3];
+    for ((_, weights), reflectance) in stack.grounds.iter().zip(&reflectance) {
+        for (colour, weight) in colours.iter_mut().zip(weights) {
+            for lane in 0..LANES {
+                colour[lane] = reflectance[lane].mul_add(*weight, colour[lane]);
             }
         }
     }
