@@ -19,6 +19,7 @@ pub mod results;
 pub mod rock;
 pub mod room;
 pub mod sequences;
+pub mod slam_sequences;
 pub mod split_meshes;
 pub mod state_programs;
 pub mod vocabulary;
