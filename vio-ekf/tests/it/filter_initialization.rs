@@ -1,9 +1,11 @@
 //! Starts in motion: everywhere along the sequences, without any help.
 
 use crate::support::sequences::{SEQUENCES, Sequence};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use vio_ekf::eval::{Alignment, align, ate};
 use vio_ekf::filter::{DynamicInitializationSettings, LandmarkSettings};
+use vio_ekf::sim::{Scenario, SimulatedCamera, Simulation, camera_ahead};
+use vio_ekf::trajectory::Spline;
 use vio_ekf::{ImuNoise, Settings, Stamp, Status, Vio, nalgebra};
 
 /// Seconds in which a start must come, and after which it is judged.
@@ -190,6 +192,46 @@ fn a_start_that_is_contradicted_is_taken_back() {
     else {
         panic!("{statuses:?}");
     };
+}
+
+/// At 8 m/s what is near moves by 60 pixels from image to image, and scale and distances are a curved valley.
+#[test]
+fn starts_in_a_race_within_a_second() {
+    let knots = (0..80).map(|k| {
+        let angle = 0.08 * f64::from(k);
+        let position = Vector3::new(5.0 * angle.sin(), -5.0 * angle.cos(), 0.5 * (2.0 * angle).sin());
+        // Nose to the outside, leaning into the turn.
+        let turn = UnitQuaternion::from_euler_angles(0.9, 0.0, angle - 0.4);
+        Isometry3::from_parts(position.into(), turn)
+    });
+    let spline = Spline::new(Stamp::from_nanos(0), 50_000_000, knots.collect()).unwrap();
+    let camera = camera_ahead();
+    let cameras = vec![SimulatedCamera { camera, ..SimulatedCamera::default() }];
+    let simulation = Simulation::new(spline, Scenario { seed: 3, cameras, ..Scenario::default() }).unwrap();
+    let first = simulation.spline().span().0;
+    let readings = simulation.imu(0).unwrap().samples;
+    for from in [0.0, 1.0, 2.0] {
+        let mut vio = Vio::new(camera, ImuNoise::default(), Settings::default()).unwrap();
+        let mut samples = readings.iter().skip_while(|s| s.stamp.secs_since(first) < from);
+        let mut began = None;
+        for index in (20.0 * from) as usize..(20.0 * from) as usize + 24 {
+            let picture = simulation.frame(0, index).unwrap().unwrap();
+            for sample in samples.by_ref() {
+                vio.imu(sample).unwrap();
+                if sample.stamp >= picture.stamp {
+                    break;
+                }
+            }
+            vio.image(picture.stamp, &picture.view()).unwrap();
+            if vio.output().is_some() {
+                began.get_or_insert(picture.stamp.secs_since(first) - from);
+            }
+        }
+        let odometry = vio.output().expect("not started");
+        let truth = simulation.motion(odometry.stamp).unwrap();
+        let off = odometry.velocity_in_body.norm() / truth.velocity_in_world.norm() - 1.0;
+        assert!(began.unwrap() <= 1.0 && off.abs() < 0.05, "from {from} s: began {began:?}, speed off by {off:.3}");
+    }
 }
 
 /// Starts over all sequences on points: `cargo test --release -p vio-ekf --test it filter_starts -- --ignored --nocapture

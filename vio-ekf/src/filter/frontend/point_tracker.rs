@@ -15,7 +15,8 @@ use crate::filter::settings::PatchSettings;
 use crate::samples::ImageView;
 
 /// Follows some dozens of corners through the images of a camera (Lucas and Kanade 1981); each keeps its id as long as it is found.
-/// The prediction is the flow so far: motion that changes by more than eight pixels from image to image is lost.
+/// The prediction is the flow so far: motion that changes by more than eight pixels from image to image is lost, and a new point is
+/// looked for within sixty.
 #[derive(Debug, Clone)]
 pub struct PointTracker {
     camera: Arc<dyn CameraModel>,

@@ -84,8 +84,7 @@ pub(super) fn refine(
         let next = global + step;
         let moved = |(point, own): (&Point, &EliminatedPoint)| {
             let own = own.step - own.link * step;
-            let rho = (point.rho + own.z).clamp(INVERSE_DISTANCES.0, INVERSE_DISTANCES.1);
-            Point { bearing: point.bearing.boxplus(&own.xy()), rho }
+            Point { bearing: point.bearing.boxplus(&own.xy()), rho: corrected(point.rho, own.z) }
         };
         let next_points: Vec<Point> = points.iter().zip(&equations.eliminated).map(moved).collect();
         match self::equations(window, kept, &next, &next_points, huber) {
@@ -116,6 +115,14 @@ pub(super) fn refine(
         eliminated: equations.eliminated,
         sigma,
     })
+}
+
+/// An inverse distance after a step, which is taken in the distance: velocity and distances then grow in the same proportion, and a step
+/// along the scale, which images hardly see, stays where it fits them. One that would halve the distance or more is taken as it is.
+fn corrected(rho: f64, step: f64) -> f64 {
+    let nearer = step / rho;
+    let rho = if nearer < 0.5 { rho / (1.0 - nearer) } else { rho + step };
+    rho.clamp(INVERSE_DISTANCES.0, INVERSE_DISTANCES.1)
 }
 
 /// Gravity has a known length; the biases are small. Information, descent and cost.
