@@ -105,6 +105,8 @@ impl CalibrationWatch {
         vio.camera().kalibr()?;
         let sure = CalibrationSettings {
             time_offset_s: given.calibration.time_offset_s,
+            // It is estimated where nothing else is.
+            time_offset_sigma_s: given.calibration.time_offset_sigma_s,
             row_time_s: given.calibration.row_time_s,
             ..CalibrationSettings::default()
         };

@@ -26,8 +26,10 @@ struct Point {
     rho: f64,
 }
 
-/// The minimum.
+/// The minimum, or where the way to it ended.
 pub(super) struct Solution {
+    /// Whether it is one: a point that was mistaken for another, at the end of its range, holds up all of them.
+    pub(super) converged: bool,
     pub(super) global: Global,
     pub(super) covariance: Information,
     /// Root mean square, pixels, each observation with its huber weight.
@@ -48,7 +50,7 @@ struct EliminatedPoint {
     matrix: Matrix3<f64>,
 }
 
-/// Levenberg and Marquardt from the closed form's solution. `None` if it does not end.
+/// Levenberg and Marquardt from the closed form's solution. `None` if the numbers do not allow it.
 pub(super) fn refine(
     window: &InitializationWindow,
     kept: &[usize],
@@ -95,9 +97,6 @@ pub(super) fn refine(
             _ => damping *= 10.0,
         }
     }
-    if !converged {
-        return None;
-    }
     // The points themselves show how well they were seen; the claim is never better than that.
     let reprojection_error = (equations.square / (equations.count - (3 * points.len() + GLOBAL) as f64).max(1.0))
         .sqrt()
@@ -107,6 +106,7 @@ pub(super) fn refine(
     let point_errors = equations.point_errors.iter().map(|m| m * window.input.focal_length).collect();
     let covariance = information.cholesky()?.inverse();
     Some(Solution {
+        converged,
         global,
         covariance,
         reprojection_error,

@@ -69,7 +69,11 @@ fn solve_with_bias(window: &InitializationWindow, settings: &DynamicInitializati
             return DynamicOutcome::Inconsistent;
         }
         if kept.len() == before {
-            return validate(window, &kept, &found, settings);
+            return if found.converged {
+                validate(window, &kept, &found, settings)
+            } else {
+                DynamicOutcome::Inconsistent
+            };
         }
     }
     DynamicOutcome::Inconsistent
