@@ -1,6 +1,7 @@
 // The page of `vr --design-page`: a picture on a surface, what stays clean, and what would come out.
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { Drawing } from "./design_drawing";
 import { Link } from "./design_link";
 import { Panel } from "./design_panel";
 import { ESTIMATE, SURFACE, readEstimate, readPicture, readSurface } from "./design_protocol";
@@ -31,11 +32,14 @@ let texture: THREE.Texture | null = null;
 let placement: (Placement & { aspect: number }) | null = null;
 /** Where the pointer took the picture, and where the picture was. */
 let grip: { from: [number, number]; offset: [number, number] } | null = null;
+/** What lines are drawn on, and whether one is being drawn. */
+let drawing: Drawing | null = null;
+let draws = false;
 let pressed: [number, number] | null = null;
 let wheel = 0;
 let due = false;
 
-const panel = new Panel(send, draw, (file) => void drop(file));
+const panel = new Panel(send, draw, (file) => void drop(file), undoLine);
 const link = new Link({ reply, binary, connected: (open, why) => panel.connected(open, why) });
 
 function send(change: Change): void {
@@ -49,7 +53,7 @@ function reply(reply: Reply): void {
       return panel.hello(reply);
     case "state":
       // An answer to an earlier change must not move what is held.
-      if (grip || wheel || reply.number < link.latest) return;
+      if (grip || draws || wheel || reply.number < link.latest) return;
       placement = reply.picture;
       panel.state(reply);
       return draw();
@@ -113,7 +117,7 @@ function draw(): void {
       camera.updateProjectionMatrix();
     }
     if (placement) surface?.place(placement, placement.aspect);
-    const waits = grip !== null || wheel !== 0 || (estimate?.number ?? -1) < link.latest;
+    const waits = grip !== null || draws || wheel !== 0 || (estimate?.number ?? -1) < link.latest;
     surface?.show(placement !== null && texture !== null && waits, placement !== null && panel.tool === "place");
     renderer.render(scene, camera);
   });
@@ -133,15 +137,70 @@ async function drop(file: File): Promise<void> {
 async function show(file: Blob): Promise<boolean> {
   const bitmap = await createImageBitmap(file, { imageOrientation: "flipY", premultiplyAlpha: "none" }).catch(() => null);
   if (!bitmap) return false;
+  drawing = null;
+  panel.lines(false);
+  const made = new THREE.Texture(bitmap);
+  made.flipY = false;
+  made.generateMipmaps = true;
+  made.minFilter = THREE.LinearMipmapLinearFilter;
+  use(made);
+  return true;
+}
+
+/** Makes a texture the one that is moved. */
+function use(made: THREE.Texture): void {
   texture?.dispose();
-  texture = new THREE.Texture(bitmap);
-  texture.flipY = false;
-  texture.generateMipmaps = true;
-  texture.minFilter = THREE.LinearMipmapLinearFilter;
+  texture = made;
   texture.needsUpdate = true;
   if (surface) surface.picture = texture;
   draw();
-  return true;
+}
+
+/** A line begins at a place: on the picture, or on all of the surface. */
+function beginLine(surface: DesignSurface, place: [number, number]): void {
+  placement ??= surface.extent();
+  if (!drawing) {
+    drawing = new Drawing((texture?.image as ImageBitmap | undefined) ?? null, placement.aspect);
+    const made = new THREE.CanvasTexture(drawing.canvas);
+    // It changes with every movement of the pointer.
+    [made.generateMipmaps, made.minFilter] = [false, THREE.LinearFilter];
+    use(made);
+  }
+  drawing.begin(onCanvas(placement, place), panel.pen.width / placement.size, panel.pen.colour);
+  draws = true;
+  redraw();
+}
+
+/** A place as shares of the picture's sides. */
+function onCanvas({ offset, size, rotate, aspect }: Placement & { aspect: number }, place: [number, number]): [number, number] {
+  const [x, y] = [place[0] - offset[0], place[1] - offset[1]];
+  const [c, s] = [Math.cos(rotate), Math.sin(rotate)];
+  return [(c * x + s * y) / size + 0.5, ((c * y - s * x) * aspect) / size + 0.5];
+}
+
+function redraw(): void {
+  if (texture) texture.needsUpdate = true;
+  draw();
+}
+
+function undoLine(): void {
+  drawing?.undo();
+  redraw();
+  void sendLines();
+}
+
+/** The picture with its lines, where it lies. */
+async function sendLines(): Promise<void> {
+  const [drawn, lies] = [drawing, placement];
+  if (!drawn || !lies) return;
+  panel.lines(drawn.canUndo);
+  const file = await drawn.file();
+  if (drawing !== drawn) return;
+  const refused = link.picture("drawn.png", file);
+  if (refused) return panel.say(refused);
+  // A new picture would lie as large as fits.
+  placement = lies;
+  sendPlacement();
 }
 
 const meet = (event: MouseEvent): Met | null => {
@@ -173,15 +232,20 @@ function sendPlacement(): void {
 canvas.addEventListener("pointerdown", (event) => {
   pressed = [event.clientX, event.clientY];
   const met = event.button === 0 ? meet(event) : null;
-  if (!met || !placement || !onPicture(met.place)) return;
-  grip = { from: met.place, offset: placement.offset };
+  if (surface && met?.place && panel.tool === "line") beginLine(surface, met.place);
+  else if (met && placement && onPicture(met.place)) grip = { from: met.place, offset: placement.offset };
+  else return;
   controls.enabled = false;
   canvas.setPointerCapture(event.pointerId);
   event.stopImmediatePropagation();
 }, { capture: true });
 
 canvas.addEventListener("pointermove", (event) => {
-  const met = grip || event.buttons === 0 ? meet(event) : null;
+  const met = grip || draws || event.buttons === 0 ? meet(event) : null;
+  if (draws) {
+    if (drawing && placement && met?.place) drawing.to(onCanvas(placement, met.place));
+    return redraw();
+  }
   if (!grip) {
     canvas.className = panel.tool !== "place" ? "mark" : met && onPicture(met.place) ? "place" : "";
     return;
@@ -197,7 +261,10 @@ canvas.addEventListener("pointerup", (event) => {
     grip = null;
     controls.enabled = true;
     if (!still) sendPlacement();
-  } else if (still && event.button === 0 && panel.tool !== "place") {
+  } else if (draws) {
+    [draws, controls.enabled] = [false, true];
+    void sendLines();
+  } else if (still && event.button === 0 && (panel.tool === "region" || panel.tool === "clean")) {
     const met = meet(event);
     if (met && surface) {
       const part = panel.part(met.point.toArray(), met.normal.toArray());
@@ -207,7 +274,8 @@ canvas.addEventListener("pointerup", (event) => {
 }, { capture: true });
 
 canvas.addEventListener("pointercancel", () => {
-  [grip, pressed, controls.enabled] = [null, null, true];
+  if (draws) void sendLines();
+  [grip, draws, pressed, controls.enabled] = [null, false, null, true];
   draw();
 });
 

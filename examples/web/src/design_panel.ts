@@ -1,12 +1,13 @@
 // The panel beside the surface of a design: what is chosen, and what it comes to.
 import type { Change, Estimate, Hello, Part, Placement, State, Surface } from "./design_protocol";
 
-export type Tool = "place" | "region" | "clean";
+export type Tool = "place" | "region" | "clean" | "line";
 
 const KEYS: Record<Tool, string> = {
   place: "drag the picture: move · wheel on it: size, with Shift: turn · drag beside it: look around · right button: shift · wheel beside it: nearer",
   region: "click: paint this part only · drag: look around",
   clean: "click: this part stays clean · drag: look around",
+  line: "drag on the surface: draw a line · drag beside it: look around",
 };
 const PALETTES: Record<string, string> = {
   six: "six: white, black, 4 hues",
@@ -29,9 +30,10 @@ export class Panel {
   private hide = 0;
   private readonly send: (change: Change) => void;
 
-  /** `send` hears what is chosen, `tool` that a click does something else. */
-  constructor(send: (change: Change) => void, tool: () => void, file: (file: File) => void) {
+  /** `send` hears what is chosen, `tool` that a click does something else, `undoLine` that the last line goes. */
+  constructor(send: (change: Change) => void, tool: () => void, file: (file: File) => void, undoLine: () => void) {
     this.send = send;
+    element("undo-line").onclick = undoLine;
     for (const button of document.querySelectorAll<HTMLButtonElement>("[data-tool]")) {
       button.onclick = () => {
         this.tool = button.dataset.tool as Tool;
@@ -63,8 +65,11 @@ export class Panel {
     for (const button of document.querySelectorAll<HTMLButtonElement>("[data-tool]")) {
       button.setAttribute("aria-checked", String(button.dataset.tool === tool));
     }
-    element("how").hidden = tool === "place";
-    element("how").style.display = tool === "place" ? "none" : "";
+    const marks = tool === "region" || tool === "clean";
+    for (const [id, shown] of [["how", marks], ["pen", tool === "line"]] as const) {
+      element(id).hidden = !shown;
+      element(id).style.display = shown ? "" : "none";
+    }
     text("keys", KEYS[tool]);
   }
 
@@ -72,6 +77,16 @@ export class Panel {
   part(point: [number, number, number], normal: [number, number, number]): Part {
     if (input("part").value === "pick") return { kind: "pick", point };
     return { kind: "disc", point, normal, radius: Number(input("radius").value) };
+  }
+
+  /** Colour and width, metres, of the next line. */
+  get pen(): { colour: string; width: number } {
+    return { colour: input("colour").value, width: Math.max(0.001, input("line-width").valueAsNumber || 0) };
+  }
+
+  /** Whether the last line may go. */
+  lines(canUndo: boolean): void {
+    (element("undo-line") as HTMLButtonElement).disabled = !canUndo;
   }
 
   connected(open: boolean, why: string): void {

@@ -153,6 +153,18 @@ export class DesignSurface {
     return { point: found.point, normal, place: [of(0), of(1)] };
   }
 
+  /** A picture that covers all of it. */
+  extent(): Placement & { aspect: number } {
+    const { places } = this.data;
+    const [low, high] = [[Infinity, Infinity], [-Infinity, -Infinity]] as [[number, number], [number, number]];
+    for (const [k, place] of places.entries()) {
+      const axis = k % 2 as 0 | 1;
+      [low[axis], high[axis]] = [Math.min(low[axis], place), Math.max(high[axis], place)];
+    }
+    const size = high[0] - low[0];
+    return { offset: [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2], size, rotate: 0, aspect: size / (high[1] - low[1]) };
+  }
+
   /** Its middle, its mean normal and its radius. */
   view(): { middle: THREE.Vector3; front: THREE.Vector3; radius: number } {
     const { geometry } = this.painted;

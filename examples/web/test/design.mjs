@@ -62,6 +62,39 @@ const state = (page) => page.evaluate(() => {
 });
 const litres = ({ estimate }) => estimate.paints.reduce((sum, paint) => sum + paint.litres, 0);
 
+/** Lines on the bare wall: what is expected is as long and as wide as what was drawn, and the last one can be taken back. */
+async function lines(page) {
+  const dark = () => page.evaluate(() => {
+    const { rgba, texel_m } = window.design.estimate();
+    return Array.from({ length: rgba.length / 4 }, (_, k) => k).filter((k) => rgba[4 * k + 3] === 255 && rgba[4 * k + 1] < 90).length * texel_m ** 2;
+  });
+  const middle = await onFirstFace(page);
+  const draw = async (z, length) => {
+    const [from, to] = [await onScreen(page, [middle[0], length / 2, z]), await onScreen(page, [middle[0], -length / 2, z])];
+    await page.mouse.move(...from);
+    await page.mouse.down();
+    for (let k = 1; k <= 10; k++) await page.mouse.move(from[0] + ((to[0] - from[0]) * k) / 10, from[1] + ((to[1] - from[1]) * k) / 10);
+    const before = await page.evaluate(() => window.design.link.latest);
+    await page.mouse.up();
+    await page.waitForFunction((before) => window.design.link.latest > before, before);
+    await estimated(page);
+  };
+  await page.click('[data-tool="line"]');
+  await page.fill("#line-width", "0.3");
+  await draw(2, 1.5);
+  const one = await dark();
+  assert.ok(Math.abs(one / (1.5 * 0.3 + (Math.PI * 0.3 ** 2) / 4) - 1) < 0.2, `${one} m² of a line`);
+  assert.equal(await page.isDisabled("#undo-line"), true, "nothing would be left");
+  await draw(2.6, 1);
+  assert.ok((await dark()) > 1.4 * one, `${await dark()} m² of two lines`);
+  if (pictures) await page.screenshot({ path: join(pictures, "design-lines.png") });
+  const before = await page.evaluate(() => window.design.link.latest);
+  await page.click("#undo-line");
+  await page.waitForFunction((before) => window.design.link.latest > before, before);
+  await estimated(page);
+  assert.ok(Math.abs((await dark()) / one - 1) < 0.02, "the last line is taken back");
+}
+
 async function design(browser) {
   await writeFile(join(scratch, "wall.obj"), WALL);
   const options = ["--design-page", "--mesh", join(scratch, "wall.obj"), "--up", "z", "--scale", "1"];
@@ -79,6 +112,7 @@ async function design(browser) {
   await page.mouse.click(...(await onScreen(page, await onFirstFace(page))));
   await page.waitForFunction(() => Math.abs(window.design.surface().data.area_m2 - 10) < 1e-6, null, { timeout: 20000 });
 
+  await lines(page);
   await drop(page, "not a picture.png", Buffer.from("hello"));
   await page.waitForFunction(() => /is no picture/.test(document.getElementById("notice").textContent));
   await drop(page, "disc & box.png", pictureFile);
