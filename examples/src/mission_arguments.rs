@@ -99,6 +99,9 @@ pub struct MissionArguments {
     /// Seed of the world, the wind and the errors [default: 1]
     #[arg(long)]
     seed: Option<u64>,
+    /// Rows of the tables of flights and states of their recordings, a second: fewer for long flights [default: 20 and 10]
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    record: Option<f64>,
     /// Memory that the mission may need by estimate, GiB [default: 8]
     #[arg(long, value_name = "GIB", value_parser = positive)]
     memory_gib: Option<f64>,
@@ -285,6 +288,7 @@ impl MissionArguments {
         settings.threads = self.threads.map_or(settings.threads, usize::from);
         settings.memory_gib = self.memory_gib.unwrap_or(settings.memory_gib);
         settings.layered = self.layers.map(LayersName::planning).or(settings.layered);
+        settings.record_hz = self.record.or(settings.record_hz);
         settings.look |= self.look;
         self.vehicle.apply(settings);
         settings.localisation = self.localisation.map(LocalisationChoice::from).or(settings.localisation);

@@ -35,6 +35,12 @@ pub enum MissionError {
         /// Its value.
         value: f64,
     },
+    /// More states a second than a recording has.
+    #[error("setting record_hz = {value}: at most 100 a second")]
+    Recorded {
+        /// What was asked for.
+        value: f64,
+    },
     /// A turntable without places, or with too many.
     #[error("setting show.turntable: it must be from 1 to 72 places")]
     Turntable,

@@ -16,7 +16,7 @@ use super::flyer::{Flight, Flyer, Purpose};
 use super::grounded::Grounded;
 use super::painting_task::PaintingTask;
 use super::plan::{Planned, PlannedLayer};
-use super::settings::MissionSettings;
+use super::settings::{KEPT_STEP, MissionSettings};
 use super::simulated_flight::reference;
 use super::sorties::{FlownPiece, Sorties, in_pieces};
 use super::spray_flights::FlownPaint;
@@ -25,8 +25,6 @@ use crate::onboard::{LocalisationFigures, Piece};
 use crate::progress::Stage;
 use crate::simulated_sensors::SHOT_STEP;
 
-/// Time between the samples that are kept of a flight, s.
-pub(super) const KEPT_STEP: f64 = 0.05;
 /// Flights of other sorties have seeds so far apart.
 const SORTIE: u64 = 0x1_0000;
 

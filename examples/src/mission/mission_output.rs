@@ -19,7 +19,7 @@ use super::path_view::{FlownWay, save_path};
 use super::progress_views::save_progress;
 use super::run::{Mission, one_after_another};
 use super::sagging::save_sagging;
-use super::settings::PainterChoice;
+use super::settings::{PainterChoice, RECORDING_STEP};
 use super::shading::shading;
 use super::team::first_of_each_cell;
 use super::trajectory_table::save_trajectories;
@@ -29,8 +29,6 @@ use crate::pictures::{COLOUR_DIFFERENCE, ErrorScale, Panel, Rgb, save_curves, sa
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
 
-/// Seconds between two states of the recording.
-pub(super) const RECORDING_STEP: f64 = 0.1;
 /// Points in a curve: more than the picture has columns shows nothing more.
 const CURVE_POINTS: usize = 2800;
 
@@ -174,7 +172,7 @@ fn save_angles(missions: &[&Mission], folder: &Path) -> Result<(), MissionError>
 fn save_mcap(missions: &[&Mission], colours: &[[u8; 3]], folder: &Path) -> Result<(), MissionError> {
     let Some(task) = missions.first().map(|mission| &mission.task) else { return Ok(()) };
     let (mut states, mut log_lines, mut paints) = (Vec::new(), Vec::new(), Vec::new());
-    let mut begun = 0.0;
+    let ([_, step], mut begun) = (task.settings.record_steps(), 0.0);
     for mission in missions {
         paints.push((begun, mission.task.paint_style()));
         if missions.len() > 1 {
@@ -183,7 +181,7 @@ fn save_mcap(missions: &[&Mission], colours: &[[u8; 3]], folder: &Path) -> Resul
         for (k, f) in mission.flights.iter().enumerate() {
             let (start, strokes) = (begun + f.start, f.route.strokes);
             log_lines.push((start, format!("layer {} of {}: {strokes} strokes", k + 1, mission.flights.len())));
-            states.extend(f.flight.every(RECORDING_STEP).map(|s| RobotState {
+            states.extend(f.flight.every(step).map(|s| RobotState {
                 robot: f.turn.robot,
                 time: start + s.time,
                 world_from_body: s.world_from_body,

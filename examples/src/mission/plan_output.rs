@@ -13,16 +13,16 @@ use serde::Serialize;
 
 use super::error::MissionError;
 use super::figures::mean;
-use super::mission_output::RECORDING_STEP;
 use super::painting_task::PaintingTask;
 use super::path_view::{FlownWay, save_path};
 use super::plan::PlannedLayer;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
 use super::planned_robot::PlannedRobot;
 use super::preview::expected_depth;
+use super::settings::{KEPT_STEP, RECORDING_STEP};
 use super::shading::{shading, vertex_colours};
 use super::team::{first_of_each_cell, planned_team, robot_file};
-use super::trajectory_table::{TRAJECTORY_STEP, cells};
+use super::trajectory_table::cells;
 use super::written_file::write;
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
@@ -147,15 +147,16 @@ pub fn save_plan(mission: &PlannedMission, folder: &Path) -> Result<PlanFigures,
     Ok(figures)
 }
 
-/// One row every [`TRAJECTORY_STEP`] seconds of what a robot flies; layers follow each other.
+/// One row after another of what a robot flies; layers follow each other.
 fn table(mission: &PlannedMission, robot: usize) -> String {
     let mut text = String::from(
         "time_s,layer,x_m,y_m,z_m,heading_rad,vx_m_per_s,vy_m_per_s,vz_m_per_s,pan_rad,tilt_rad,flow_m3_per_s,\
          target_x_m,target_y_m,target_z_m,pitch_rad\n",
     );
+    let [step, _] = mission.task.settings.record_steps();
     let own = mission.layers().filter(|(_, layer)| layer.turn.robot == robot);
     for (k, (start, layer)) in own.enumerate() {
-        for (time, s) in layer.plan.setpoints(TRAJECTORY_STEP) {
+        for (time, s) in layer.plan.setpoints(step) {
             let (p, v) = (s.sample.position, s.sample.velocity);
             let PitchingJoints { pitch, pan, tilt } = mission.task.planned_robot.joints(s.pan, s.tilt);
             let row = [
@@ -172,11 +173,11 @@ fn table(mission: &PlannedMission, robot: usize) -> String {
 
 fn save_mcap(mission: &PlannedMission, colours: &[[u8; 3]], folder: &Path) -> Result<(), MissionError> {
     let task = &mission.task;
-    let positions = task.surface.vertices();
+    let ([_, step], positions) = (task.settings.record_steps(), task.surface.vertices());
     let (mut states, mut log) = (Vec::new(), Vec::new());
     for (k, (start, PlannedLayer { route, plan, turn, .. })) in mission.layers().enumerate() {
         log.push((start, format!("layer {}: {} strokes, as planned", k + 1, route.strokes)));
-        states.extend(plan.setpoints(RECORDING_STEP).map(|(time, s)| state(task, turn.robot, start + time, &s)));
+        states.extend(plan.setpoints(step).map(|(time, s)| state(task, turn.robot, start + time, &s)));
     }
     let faces = task.surface.disk().faces();
     let mesh = ColouredMesh { positions: &positions, faces, colours, bare: task.appearance.srgb(0.0) };
@@ -256,7 +257,7 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
 /// Greatest planned pitch, radians; `None` where the vehicle is level.
 fn max_pitch(mission: &PlannedMission) -> Option<f64> {
     let task = &mission.task;
-    let states = mission.plans().flat_map(|(_, plan)| plan.setpoints(TRAJECTORY_STEP).map(|(_, s)| (s.pan, s.tilt)));
+    let states = mission.plans().flat_map(|(_, plan)| plan.setpoints(KEPT_STEP).map(|(_, s)| (s.pan, s.tilt)));
     let pitch = |(pan, tilt)| task.planned_robot.joints(pan, tilt).pitch.abs();
     (task.settings.pitch > 0.0).then(|| states.map(pitch).fold(0.0, f64::max))
 }

@@ -22,6 +22,13 @@ use paint_sim::film::wet::Ground;
 use paint_sim::flight::{Airframe, Faults};
 use paint_sim::paint::PaintName;
 
+/// Seconds between two states of a recording, where nothing else is asked for.
+pub(super) const RECORDING_STEP: f64 = 0.1;
+/// Most of either a second: more than an autopilot takes.
+const MOST_RECORDED: f64 = 100.0;
+/// Seconds between two samples of a flight that are kept, and rows of a table where nothing else is asked for.
+pub(super) const KEPT_STEP: f64 = 0.05;
+
 /// Everything a mission can be told.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -101,6 +108,10 @@ pub struct MissionSettings {
     /// behind the middle of the flight.
     #[serde(skip_serializing_if = "FlightConstraints::is_empty")]
     pub constraints: FlightConstraints,
+    /// Rows of `trajectory.csv` and `plan.csv`, and states in `mission.mcap` and `plan.mcap`, a second; without it 20 and 10. Flights are
+    /// kept at 20, so more is the same.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub record_hz: Option<f64>,
     /// How the painted surface is shown.
     #[serde(skip_serializing_if = "Showing::is_default")]
     pub show: Showing,
@@ -234,6 +245,7 @@ impl Default for MissionSettings {
             faults: Faults::default(),
             sensor_faults: Vec::new(),
             constraints: FlightConstraints::default(),
+            record_hz: None,
             show: Showing::default(),
         }
     }
@@ -243,10 +255,15 @@ impl MissionSettings {
     /// Refuses sizes that are none. What belongs to a library, the library checks.
     pub(super) fn check(&self) -> Result<(), MissionError> {
         let sizes = [("texel", self.texel), ("spot", self.spot), ("memory_gib", self.memory_gib)];
-        for (name, value) in sizes.into_iter().chain(self.placement.size.map(|size| ("placement.size", size))) {
+        let asked = [("placement.size", self.placement.size), ("record_hz", self.record_hz)];
+        let asked = asked.into_iter().filter_map(|(name, value)| Some((name, value?)));
+        for (name, value) in sizes.into_iter().chain(asked) {
             if !(value.is_finite() && value > 0.0) {
                 return Err(MissionError::Setting { name, value });
             }
+        }
+        if let Some(value) = self.record_hz.filter(|hz| *hz > MOST_RECORDED) {
+            return Err(MissionError::Recorded { value });
         }
         if !(0.0..=FRAC_PI_3).contains(&self.pitch) {
             return Err(MissionError::Pitch { value: self.pitch });
@@ -267,6 +284,11 @@ impl MissionSettings {
         self.team.check()?;
         self.show.check()?;
         Ok(self.constraints.check()?)
+    }
+
+    /// Seconds between two rows of a table of the flights, and between two states of a recording.
+    pub(super) fn record_steps(&self) -> [f64; 2] {
+        self.record_hz.map_or([KEPT_STEP, RECORDING_STEP], |hz| [1.0 / hz; 2])
     }
 
     /// Refuses a vehicle that nothing simulates.

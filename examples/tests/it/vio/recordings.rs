@@ -56,7 +56,8 @@ fn folders_and_mcap_files_give_the_same_trajectory() {
         *stamp = Stamp::from_nanos(stamp.nanos() - 30_000_000);
     }
     let found = run(&late, &RunSettings { threads: 1, quiet: true, ..RunSettings::default() }).unwrap().run;
-    assert_eq!(found.calibration.time_offset_s, 0.03);
+    // It is estimated from a millisecond.
+    assert!((found.calibration.time_offset_s - 0.03).abs() < 1e-3, "{}", found.calibration.time_offset_s);
     close(&vio_ekf::format::tum::write(&found.trajectories().unwrap()[0]), &reference, 1e-6);
 
     let through_mcap = follow(&recorded, 1);
