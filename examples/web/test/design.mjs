@@ -50,6 +50,14 @@ const estimated = (page, own = false) =>
     return found && found.number >= link.latest && link.left.size === 0 && (!own || found.own) && found.paints.length > 0;
   }, own, { timeout: 150000 });
 
+/** Does what is a change, but not at once, and waits for its estimate. */
+async function changed(page, act) {
+  const before = await page.evaluate(() => window.design.link.latest);
+  await act();
+  await page.waitForFunction((before) => window.design.link.latest > before, before);
+  await estimated(page);
+}
+
 const onScreen = (page, point) => page.evaluate((point) => window.design.onScreen(point), point);
 /** The middle of the first face of what is painted. */
 const onFirstFace = (page) => page.evaluate(() => {
@@ -74,10 +82,7 @@ async function lines(page) {
     await page.mouse.move(...from);
     await page.mouse.down();
     for (let k = 1; k <= 10; k++) await page.mouse.move(from[0] + ((to[0] - from[0]) * k) / 10, from[1] + ((to[1] - from[1]) * k) / 10);
-    const before = await page.evaluate(() => window.design.link.latest);
-    await page.mouse.up();
-    await page.waitForFunction((before) => window.design.link.latest > before, before);
-    await estimated(page);
+    await changed(page, () => page.mouse.up());
   };
   await page.click('[data-tool="line"]');
   await page.fill("#line-width", "0.3");
@@ -88,10 +93,7 @@ async function lines(page) {
   await draw(2.6, 1);
   assert.ok((await dark()) > 1.4 * one, `${await dark()} m² of two lines`);
   if (pictures) await page.screenshot({ path: join(pictures, "design-lines.png") });
-  const before = await page.evaluate(() => window.design.link.latest);
-  await page.click("#undo-line");
-  await page.waitForFunction((before) => window.design.link.latest > before, before);
-  await estimated(page);
+  await changed(page, () => page.click("#undo-line"));
   assert.ok(Math.abs((await dark()) / one - 1) < 0.02, "the last line is taken back");
 }
 
@@ -115,8 +117,7 @@ async function design(browser) {
   await lines(page);
   await drop(page, "not a picture.png", Buffer.from("hello"));
   await page.waitForFunction(() => /is no picture/.test(document.getElementById("notice").textContent));
-  await drop(page, "disc & box.png", pictureFile);
-  await estimated(page);
+  await changed(page, () => drop(page, "disc & box.png", pictureFile));
   const whole = await state(page);
   // As large as fits: 2.5 m high, 3.33 m wide.
   assert.ok(Math.abs(whole.placement.size - 10 / 3) < 0.08, `it fits: ${whole.placement.size} m`);
