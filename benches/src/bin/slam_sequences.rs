@@ -32,8 +32,8 @@ struct Arguments {
     #[arg(long, num_args = 1.., default_value = "0")]
     active_mib: Vec<usize>,
     /// Threads
-    #[arg(long, default_value_t = 1)]
-    threads: usize,
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
     /// Writes the images of each sequence into a folder of its name there, for `mapping_peers.py slam`
     #[arg(long, value_name = "DIR")]
     save: Option<PathBuf>,
@@ -61,7 +61,7 @@ fn all(arguments: &Arguments) -> Result<(), AnyError> {
                 let Arguments { frames, seed, threads, .. } = *arguments;
                 let active_bytes = (mib > 0).then_some(mib << 20);
                 let mut save = Saved::new(arguments.save.as_deref(), sequence)?;
-                let limits = Limits { frames, voxel, seed, threads, active_bytes };
+                let limits = Limits { frames, voxel, seed, threads: threads.into(), active_bytes };
                 let figures = run(sequence, &limits, &mut |k, time, pose, shot| save.frame(k, time, pose, shot))?;
                 println!("{}", serde_json::to_string(&figures)?);
                 rows.push(row(&figures, voxel, sequence.published));
