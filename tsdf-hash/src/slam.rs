@@ -11,6 +11,7 @@ mod frame_source;
 mod frontend;
 mod frontend_state;
 mod gyroscope;
+mod key_view;
 mod local_map;
 #[cfg(feature = "pose-graph")]
 mod loop_correction;

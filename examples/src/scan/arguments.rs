@@ -49,6 +49,10 @@ pub(super) struct Simulation {
     pub(super) out: PathBuf,
 }
 
+fn parse_frames(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|frames| (1..=1000).contains(frames)).ok_or_else(|| "give frames, 1 to 1000".into())
+}
+
 fn parse_seconds(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|v: &f64| *v > 0.0 && *v <= 600.0);
     value.ok_or_else(|| "give seconds, at most 600".into())
@@ -122,6 +126,9 @@ pub struct Arguments {
     /// Look for places that were seen before, measure the drift since then, and correct poses and map
     #[arg(long, conflicts_with = "relocalise")]
     pub(super) loops: bool,
+    /// Frames that share one ray cast of the map to be tracked against; those between see it from where they are
+    #[arg(long, value_name = "FRAMES", default_value_t = 1, value_parser = parse_frames)]
+    pub(super) model_every: usize,
     /// What keeps the map
     #[arg(long, default_value = "auto")]
     pub(super) device: DeviceName,
@@ -269,6 +276,7 @@ pub(super) fn settings(arguments: &Arguments) -> Result<ScanSettings, String> {
     let fuse = relocalise.is_none() || arguments.extend;
     let loops = arguments.loops.then(LoopSettings::default);
     let checkpoint = checkpoint.filter(|_| fuse);
-    let slam = SlamSettings { map, poses, device, fuse, loops, ..SlamSettings::default() };
+    let model_every = arguments.model_every;
+    let slam = SlamSettings { map, poses, device, fuse, loops, model_every, ..SlamSettings::default() };
     Ok(ScanSettings { slam, swap, resume, relocalise, checkpoint, live, ..ScanSettings::default() })
 }

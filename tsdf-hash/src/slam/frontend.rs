@@ -9,6 +9,7 @@ use crate::keyframes::index::KeyframeIndex;
 use crate::settings::Settings;
 use crate::slam::frontend_state::{FrontendState, Last};
 use crate::slam::gyroscope::Gyroscope;
+use crate::slam::key_view::KeyView;
 use crate::slam::local_map::LocalMap;
 use crate::slam::motion_model::{MotionModel, StampedPose};
 use crate::slam::outcome::Event;
@@ -51,6 +52,7 @@ pub struct Frontend {
     relocaliser: Relocaliser,
     /// Tracked against instead of the whole map, where loops are looked for.
     local_map: Option<LocalMap>,
+    key_view: KeyView,
     motion: MotionModel,
     last: Last,
     usual: UsualAgreement,
@@ -80,6 +82,7 @@ impl Frontend {
             tracker: Tracker::new(TrackingSettings { min_agreement, ..tracking })?,
             relocaliser: Relocaliser::new(tracking)?,
             local_map: settings.closes_loops().then(|| LocalMap::new(map)),
+            key_view: KeyView::new(settings.model_every),
             motion: MotionModel::new(odometry, settings.frame_interval),
             last: Last::Tracked,
             usual: UsualAgreement::default(),
@@ -148,6 +151,7 @@ impl Frontend {
         if let Some(local) = &mut self.local_map {
             local.move_by(correction);
         }
+        self.key_view.forget();
         self.motion.move_by(correction);
     }
 
@@ -189,6 +193,7 @@ impl Frontend {
                 Some(found) => {
                     located.events.push(Event::Relocalised { earlier: found.earlier.len() });
                     self.motion.forget();
+                    self.key_view.forget();
                     self.local_map.iter_mut().for_each(LocalMap::forget);
                     located.earlier = found.earlier;
                     Some(found.outcome)
@@ -251,6 +256,12 @@ impl Frontend {
             priors.extend(self.motion.turned_back());
         }
         let mut best: Option<TrackingOutcome> = None;
+        if !is_guess && !is_fast {
+            let led = priors.first().map(|prior| self.follow_key_view(map.settings().voxel_size, depth, colour, prior));
+            if let Some(outcome) = led.transpose()?.flatten() {
+                return Ok(Some(outcome));
+            }
+        }
         for prior in priors {
             let outcome = self.track(map, depth, colour, &prior, is_guess)?;
             if !is_fast && !self.usual.is_doubtful(&outcome, &self.tracker) {
@@ -275,6 +286,23 @@ impl Frontend {
             best.status = TrackingStatus::Disagreement;
         }
         Ok(Some(best))
+    }
+
+    /// Tracks a frame against the last ray cast, as it is seen from where the motion before leads; `None` where a new one is due, or where that
+    /// does not convince.
+    fn follow_key_view(
+        &mut self,
+        voxel_size: f64,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        prior: &PosePrior,
+    ) -> Result<Option<TrackingOutcome>, Error> {
+        let older = self.local_map.as_mut().and_then(LocalMap::older);
+        let world_from_map = older.map_or_else(Isometry3::identity, |(_, pose)| pose);
+        let there = prior.seen_from(&world_from_map.inverse());
+        let Some(view) = self.key_view.seen_from(&there.world_from_camera)? else { return Ok(None) };
+        let outcome = self.tracker.track_view(&view, voxel_size, depth, colour, &there)?.seen_from(&world_from_map);
+        Ok(Some(self.judged(outcome, false)).filter(|outcome| !self.usual.is_doubtful(outcome, &self.tracker)))
     }
 
     /// Whether odometry leads, and all that a frame shows of a map that stays as it is agrees there, only not enough to fix its pose: neither
@@ -335,7 +363,14 @@ impl Frontend {
         if is_guess || self.fixed_map || self.resumed {
             self.tracker.reload_view(map, depth, &there.world_from_camera)?;
         }
-        let mut outcome = self.tracker.track(map, depth, colour, &there)?.seen_from(&world_from_map);
+        let view = self.tracker.model(map, depth, colour.is_some(), &there.world_from_camera)?;
+        let outcome = self.tracker.track_view(&view, map.settings().voxel_size, depth, colour, &there)?;
+        self.key_view.keep(view);
+        Ok(self.judged(outcome.seen_from(&world_from_map), is_guess))
+    }
+
+    /// An outcome whose status says what the tracker alone does not know.
+    fn judged(&self, mut outcome: TrackingOutcome, is_guess: bool) -> TrackingOutcome {
         // A map that does not grow is left sooner or later: what little of it is in view then leads anywhere.
         if self.fixed_map && (outcome.coverage < LEAST_COVERAGE || !outcome.degenerate.is_empty()) {
             outcome.status = TrackingStatus::NoOverlap;
@@ -347,7 +382,7 @@ impl Frontend {
         if is_guess && outcome.agreement < self.tracker.settings().relocalise_agreement {
             outcome.status = TrackingStatus::Disagreement;
         }
-        Ok(outcome)
+        outcome
     }
 }
 

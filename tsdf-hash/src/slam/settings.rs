@@ -44,6 +44,9 @@ pub struct SlamSettings {
     pub loops: Option<LoopSettings>,
     /// Fused frames that follow a correction with each new one (ours: 4; a loop of a minute is in the map after a few seconds).
     pub reintegrated_per_frame: usize,
+    /// Frames that share one ray cast to be tracked against; those between see it forward projected ("onboard+", thesis Paper I, section 6.2,
+    /// every few frames). 1 (the default): each has its own. A run that goes on from a stored state begins with a new one.
+    pub model_every: usize,
     /// Of given poses, one in so many is compared with the map before its frame is fused (ours: 5); 0: none.
     pub check_every: usize,
 }
@@ -61,6 +64,7 @@ impl Default for SlamSettings {
             #[cfg(feature = "pose-graph")]
             loops: None,
             reintegrated_per_frame: 4,
+            model_every: 1,
             check_every: 5,
         }
     }
@@ -80,6 +84,9 @@ impl SlamSettings {
                 turn.min(shift),
                 "finite and above 0, the turn (radians) and the shift (metres)",
             );
+        }
+        if self.model_every == 0 {
+            return refuse("model_every", 0.0, "1 or more frames");
         }
         if self.relocalise_first && self.poses == PoseSource::Given {
             return refuse("relocalise_first", 1.0, "false (0) where poses are given");
