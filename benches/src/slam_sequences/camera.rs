@@ -8,8 +8,6 @@ use crate::Rng;
 
 /// Depth values per metre.
 const SCALE: f64 = 1000.0;
-/// Farthest depth that the camera gives, metres.
-const FARTHEST: f64 = 8.0;
 
 /// A depth camera with registered colours.
 #[derive(Debug, Clone, Copy)]
@@ -20,6 +18,8 @@ pub struct DepthCamera {
     pub intrinsics: Intrinsics,
     /// Deviation of a depth `z`: `noise[0] + noise[1] (z - 0.4)²`, m (Nguyen et al. 2012).
     pub noise: [f64; 2],
+    /// Farthest depth that it gives, m.
+    pub farthest: f64,
 }
 
 /// What it sees.
@@ -71,7 +71,7 @@ impl DepthCamera {
             } else {
                 0.0
             };
-            *depth = if z < FARTHEST { (SCALE * (z + noise)).round().max(0.0) as u16 } else { 0 };
+            *depth = if z < self.farthest { (SCALE * (z + noise)).round().max(0.0) as u16 } else { 0 };
         }
     }
 }
