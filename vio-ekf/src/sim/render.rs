@@ -2,8 +2,10 @@
 //!
 //! All surfaces are rectangles across the world's axes, so that a hit is a quotient and texture coordinates are linear in
 //! it. Most tiles see one surface only, which the rays through their corners tell: a rectangle is convex. The others find
-//! the nearest surface for each pixel. The mip level of a ray is drawn between the two nearest by an ordered pattern: the
-//! mean over the poses of an exposure is what interpolating between the levels would give, at half the price.
+//! the nearest surface for each pixel.
+//!
+//! A frame has no age: the poses of its exposure come in pairs, as long before its middle as after, at opposite places of
+//! the pixel and equally sharp. What moves is as blurred ahead as behind.
 
 use nalgebra::{Isometry3, Matrix3, Vector2, Vector3};
 
@@ -87,8 +89,6 @@ pub(super) struct View<'a> {
     bodies: Vec<Body<'a>>,
     /// Where in the pixel this pose samples, pixels from its centre.
     offset: Vector2<f32>,
-    /// Which part, from 0 to 1, and which share of the dither pattern belongs to this pose.
-    dither: (f32, f32),
 }
 
 impl<'a> View<'a> {
@@ -104,15 +104,15 @@ impl<'a> View<'a> {
         let share = 1.0 / count as f64;
         let cuboids = std::iter::once(&room.walls).chain(&room.furniture).chain(moving);
         let bodies = cuboids.map(|c| body(c, &eye, &room.textures, share as f32)).collect();
-        // One pose in each column and in each row of a grid over the pixel: the mean of the places is its centre.
-        let row = if count % 2 == 1 { 2 * index % count } else { 2 * (index + 1) % (count + 1) - 1 };
+        // One pose in each column and in each row of a grid over the pixel, first and last opposite each other.
+        let row =
+            if count % 2 == 1 { (2 * index + count.div_ceil(2)) % count } else { 2 * (index + 1) % (count + 1) - 1 };
         let place = |cell: usize| ((cell as f64 + 0.5) * share - 0.5) as f32;
         Self {
             world_from_camera: world_from_camera.rotation.to_rotation_matrix().into_inner().cast(),
             turn_per_row: turn_per_row.cast(),
             bodies,
             offset: Vector2::new(place(index), place(row)),
-            dither: (index as f32 * share as f32, share as f32),
         }
     }
 
@@ -120,7 +120,7 @@ impl<'a> View<'a> {
     pub(super) fn add_tile(&self, rays: &TileRays, sum: &mut [f32; TILE]) {
         let directions = self.in_world(rays);
         match self.one_face(&directions) {
-            Some(face) => self.add_face(&face, &directions, rays.half_log_solid_angle, sum),
+            Some(face) => face.add_tile(&directions, rays.half_log_solid_angle, sum),
             None => self.add_mixed(&directions, rays.half_log_solid_angle, sum),
         }
     }
@@ -161,27 +161,6 @@ impl<'a> View<'a> {
         filled.then(|| body.faces[face])
     }
 
-    fn add_face(&self, face: &Face, directions: &[[f32; TILE]; 3], half_log_angle: f32, sum: &mut [f32; TILE]) {
-        let [du, dv] = TEXTURE_AXES[face.axis].map(|axis| &directions[axis]);
-        let normal = &directions[face.axis];
-        let base = face.level_at_1m + half_log_angle + self.dither.0;
-        let most = (face.texture.levels.len() - 1) as f32;
-        let (mut u, mut v, mut level) = ([0_u32; TILE], [0_u32; TILE], [0_u32; TILE]);
-        for i in 0..TILE {
-            let depth = face.distance / normal[i];
-            let rank = base + footprint(depth, normal[i]) + self.dither.1 * PATTERN[i];
-            let l = rank.clamp(0.0, most) as i32;
-            let shrink = f32::from_bits(((127 - l) as u32) << 23);
-            u[i] = ((face.origin[0] + depth * du[i] * face.scale) * shrink - 128.0) as i32 as u32;
-            v[i] = ((face.origin[1] + depth * dv[i] * face.scale) * shrink - 128.0) as i32 as u32;
-            level[i] = l as u32;
-        }
-        for i in 0..TILE {
-            let texel = face.texture.sample(face.texture.levels[level[i] as usize], u[i], v[i]);
-            sum[i] += texel as f32 * face.weight;
-        }
-    }
-
     fn add_mixed(&self, directions: &[[f32; TILE]; 3], half_log_angle: f32, sum: &mut [f32; TILE]) {
         for i in 0..TILE {
             let d = Vector3::new(directions[0][i], directions[1][i], directions[2][i]);
@@ -193,20 +172,56 @@ impl<'a> View<'a> {
                     face = &body.faces[hit];
                 }
             }
-            let depth = face.distance / d[face.axis];
-            let rank = face.level_at_1m
-                + half_log_angle
-                + self.dither.0
-                + footprint(depth, d[face.axis])
-                + self.dither.1 * PATTERN[i];
-            let l = rank.clamp(0.0, (face.texture.levels.len() - 1) as f32) as i32;
-            let shrink = f32::from_bits(((127 - l) as u32) << 23);
-            let [u, v] = std::array::from_fn(|k| {
-                let along = d[TEXTURE_AXES[face.axis][k]];
-                ((face.origin[k] + depth * along * face.scale) * shrink - 128.0) as i32 as u32
-            });
-            sum[i] += face.texture.sample(face.texture.levels[l as usize], u, v) as f32 * face.weight;
+            let along = TEXTURE_AXES[face.axis].map(|axis| d[axis]);
+            sum[i] += face.brightness(&face.place(d[face.axis], along, half_log_angle));
         }
+    }
+}
+
+/// Where a ray meets a texture: coordinates in 256ths of a texel of a mip level, and the share of the next.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    u: i32,
+    v: i32,
+    level: i32,
+    next: f32,
+}
+
+impl Face<'_> {
+    /// Adds the brightness of a tile that this face fills.
+    fn add_tile(&self, directions: &[[f32; TILE]; 3], half_log_angle: f32, sum: &mut [f32; TILE]) {
+        let [du, dv] = TEXTURE_AXES[self.axis].map(|axis| &directions[axis]);
+        let normal = &directions[self.axis];
+        let mut places = [Place::default(); TILE];
+        for (i, place) in places.iter_mut().enumerate() {
+            *place = self.place(normal[i], [du[i], dv[i]], half_log_angle);
+        }
+        for (value, place) in sum.iter_mut().zip(&places) {
+            *value += self.brightness(place);
+        }
+    }
+
+    /// Of a ray with these components along the normal and along the texture's axes.
+    #[inline(always)]
+    fn place(&self, normal: f32, along: [f32; 2], half_log_angle: f32) -> Place {
+        let depth = self.distance / normal;
+        let most = self.texture.levels.len() as i32 - 1;
+        let rank = (self.level_at_1m + half_log_angle + footprint(depth, normal)).clamp(0.0, most as f32);
+        let level = (rank as i32).min(most - 1);
+        let shrink = f32::from_bits(((127 - level) as u32) << 23);
+        // From corners to centres of texels, half a texel, and rounded to the nearest.
+        let at = |k: usize| ((self.origin[k] + depth * along[k] * self.scale) * shrink - 127.5) as i32;
+        Place { u: at(0), v: at(1), level, next: rank - level as f32 }
+    }
+
+    /// Interpolated between the level and the next.
+    #[inline(always)]
+    fn brightness(&self, place: &Place) -> f32 {
+        let (levels, level) = (&self.texture.levels, place.level as usize);
+        let sharp = self.texture.sample(levels[level], place.u as u32, place.v as u32) as f32;
+        let coarse = |c: i32| ((c - 128) >> 1) as u32;
+        let soft = self.texture.sample(levels[level + 1], coarse(place.u), coarse(place.v)) as f32;
+        (sharp + (soft - sharp) * place.next) * self.weight
     }
 }
 
@@ -216,22 +231,6 @@ fn footprint(depth: f32, cosine: f32) -> f32 {
     // The bits of a float are its logarithm, linear between powers of two: at most 0.09 off, and continuous.
     let area = depth * depth / cosine.abs();
     (area.to_bits() as i32 - 0x3f80_0000) as f32 * (0.5 / 8_388_608.0)
-}
-
-/// Thresholds in `[0, 1)`, spread evenly in every neighbourhood (the additive recurrence on the plastic number).
-static PATTERN: [f32; TILE] = pattern();
-
-const fn pattern() -> [f32; TILE] {
-    let mut out = [0.0; TILE];
-    let mut i = 0;
-    while i < TILE {
-        // 2^32 over the plastic number and over its square.
-        let place = ((i % TILE_WIDTH) as u32).wrapping_mul(3_242_174_889);
-        let place = place.wrapping_add(((i / TILE_WIDTH) as u32).wrapping_mul(2_447_445_414));
-        out[i] = (place >> 8) as f32 / 16_777_216.0;
-        i += 1;
-    }
-    out
 }
 
 impl Body<'_> {

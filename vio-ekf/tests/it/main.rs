@@ -25,6 +25,7 @@ mod lie;
 mod map_aided;
 mod max_measured;
 mod memory;
+mod motion_blur;
 mod own_camera_model;
 mod own_measurement;
 mod own_picture;
