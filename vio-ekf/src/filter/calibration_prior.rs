@@ -31,7 +31,7 @@ pub(crate) fn set_calibration(covariance: &mut Covariance, state: &VioState, set
     let Settings { calibration, imu, .. } = settings;
     covariance.set_diagonal3(error_state::CAMERA_POSITION, [calibration.camera_position_sigma_m; 3]);
     covariance.set_diagonal3(error_state::CAMERA_ATTITUDE, [calibration.camera_attitude_sigma; 3]);
-    covariance.reset_row(error_state::TIME_OFFSET, calibration.time_offset_sigma_s.powi(2));
+    covariance.reset_row(error_state::TIME_OFFSET, calibration.time_offset_sigma_s.unwrap_or(0.0).powi(2));
     if state.accel_matrix.is_some() {
         for (entry, sigma) in prior_sigma(imu).iter().enumerate() {
             covariance.reset_row(error_state::ACCEL_MATRIX + entry, sigma * sigma);

@@ -26,7 +26,7 @@ use crate::samples::{ImageView, Imu, ImuNoise};
 use crate::stamp::Stamp;
 use crate::trace::{event, span};
 
-/// What a calibration file knows of a camera's clock at best, s. The middle of an exposure is where its light is; two tenths of a millisecond
+/// What a calibration file knows of a camera's clock, s. The middle of an exposure is where its light is; two tenths of a millisecond
 /// at 3 rad/s move all landmarks by a quarter of a pixel at once, and a filter that is sure of its clock takes that for motion.
 const CLOCK_SIGMA_S: f64 = 1e-3;
 
@@ -120,8 +120,9 @@ impl Vio {
     /// and the time offset of the first camera (`timeshift_cam_imu`), which is added to
     /// [`CalibrationSettings::time_offset_s`](crate::filter::CalibrationSettings::time_offset_s), as the time of a row of its shutter
     /// (`line_delay`) is to [`row_time_s`](crate::filter::CalibrationSettings::row_time_s). The filter's body is the inertial sensor:
-    /// where that is not the body of the calibration, the cameras are moved into its axes. The clock is known to a millisecond at best, and
-    /// estimated from there.
+    /// where that is not the body of the calibration, the cameras are moved into its axes. The clock is taken as known to a millisecond, and
+    /// estimated from there, unless
+    /// [`time_offset_sigma_s`](crate::filter::CalibrationSettings::time_offset_sigma_s) says how well: 0, exactly.
     ///
     /// Both images of a pair carry one stamp, that of the first camera's clock.
     pub fn from_calibration(
@@ -143,7 +144,7 @@ impl Vio {
             _ => return Err(invalid("cameras", cameras.len() as f64, "must be one or two")),
         };
         settings.calibration.time_offset_s += first.time_offset_s;
-        settings.calibration.time_offset_sigma_s = settings.calibration.time_offset_sigma_s.max(CLOCK_SIGMA_S);
+        settings.calibration.time_offset_sigma_s.get_or_insert(CLOCK_SIGMA_S);
         settings.calibration.row_time_s += first.row_time_s;
         match second {
             Some(second) => Self::stereo(on_imu(first), on_imu(second), imu.noise, settings),

@@ -123,7 +123,7 @@ fn finds_the_cameras_place_and_clock() {
             camera_position_sigma_m: 0.02,
             camera_attitude_sigma: 0.03,
             time_offset_s: 0.0,
-            time_offset_sigma_s: 0.01,
+            time_offset_sigma_s: Some(0.01),
             stamp_jitter_s: 0.0,
             ..CalibrationSettings::default()
         };

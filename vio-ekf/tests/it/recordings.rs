@@ -5,6 +5,7 @@ use crate::support::recorded;
 use crate::support::rng::Rng;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use vio_ekf::camera::Distortion;
+use vio_ekf::filter::Calibration;
 use vio_ekf::format::calibration::{
     CameraCalibration, ImuCalibration, read_asl_camera, read_asl_imu, read_kalibr_cameras, read_kalibr_imu,
     write_asl_camera, write_asl_imu,
@@ -65,14 +66,9 @@ fn kalibr_chains_are_read() {
     assert_eq!((imu.noise, imu.rate_hz, imu.body_from_imu), (noise, 200.0, Isometry3::identity()));
 }
 
-#[test]
-fn kalibr_files_make_a_filter_in_one_call() {
-    let cameras = read_kalibr_cameras(KALIBR).unwrap();
-    let body_from_imu = Isometry3::new(Vector3::new(0.3, 0.0, -0.1), Vector3::new(0.0, 0.2, 0.0));
-    let imu = ImuCalibration { noise: ImuNoise::default(), rate_hz: 200.0, body_from_imu };
-    let mut settings = Settings::default();
-    settings.calibration.time_offset_s = 0.5;
-    let mut vio = Vio::from_calibration(&cameras[..1], &imu, settings).unwrap();
+/// The calibration that a filter of one camera starts with.
+fn calibration_of(cameras: &[CameraCalibration], imu: &ImuCalibration, settings: &Settings) -> Calibration {
+    let mut vio = Vio::from_calibration(cameras, imu, *settings).unwrap();
     let stamp = Stamp::from_nanos(7);
     vio.imu(&Imu { stamp, gyro: Vector3::zeros(), accel: Vector3::new(0.0, 0.0, 9.81) }).unwrap();
     vio.initialize(&InitialState {
@@ -84,7 +80,17 @@ fn kalibr_files_make_a_filter_in_one_call() {
         sigma: InitialSigma::default(),
     })
     .unwrap();
-    let found = vio.calibration().unwrap();
+    vio.calibration().unwrap()
+}
+
+#[test]
+fn kalibr_files_make_a_filter_in_one_call() {
+    let cameras = read_kalibr_cameras(KALIBR).unwrap();
+    let body_from_imu = Isometry3::new(Vector3::new(0.3, 0.0, -0.1), Vector3::new(0.0, 0.2, 0.0));
+    let imu = ImuCalibration { noise: ImuNoise::default(), rate_hz: 200.0, body_from_imu };
+    let mut settings = Settings::default();
+    settings.calibration.time_offset_s = 0.5;
+    let found = calibration_of(&cameras[..1], &imu, &settings);
     // The chain's -0.0125 s and the caller's own 0.5 s.
     assert!((found.time_offset_s - 0.4875).abs() < 1e-15, "{}", found.time_offset_s);
     // A point of the camera seen from the body and from the sensor on it.
@@ -96,6 +102,19 @@ fn kalibr_files_make_a_filter_in_one_call() {
             Vio::from_calibration(wrong, &imu, settings),
             Err(Error::InvalidSetting { name: "cameras", .. })
         ));
+    }
+}
+
+/// What a file says of a clock is good to a millisecond, and as good as the caller says if he does.
+#[test]
+fn the_clock_of_a_file_is_estimated_unless_it_is_called_exact() {
+    let cameras = read_kalibr_cameras(KALIBR).unwrap();
+    let imu = ImuCalibration { noise: ImuNoise::default(), rate_hz: 200.0, body_from_imu: Isometry3::identity() };
+    for (said, expected) in [(None, 1e-3), (Some(2e-4), 2e-4), (Some(0.01), 0.01), (Some(0.0), 0.0)] {
+        let mut settings = Settings::default();
+        settings.calibration.time_offset_sigma_s = said;
+        let found = calibration_of(&cameras[..1], &imu, &settings).covariance[(6, 6)].sqrt();
+        assert!((found - expected).abs() < 1e-15, "{said:?}: {found}");
     }
 }
 

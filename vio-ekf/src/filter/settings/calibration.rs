@@ -13,8 +13,9 @@ pub struct CalibrationSettings {
     pub camera_attitude_sigma: f64,
     /// Seconds to add to the camera's stamps to get the inertial sensor's time (`timeshift_cam_imu` of Kalibr); 0.
     pub time_offset_s: f64,
-    /// Its standard deviation, s; ours: 0.
-    pub time_offset_sigma_s: f64,
+    /// Its standard deviation, s; ours, where none is given: 1 ms of a clock that a calibration file describes
+    /// ([`Vio::from_calibration`](crate::Vio::from_calibration)), and 0, known exactly, of a camera that is given itself.
+    pub time_offset_sigma_s: Option<f64>,
     /// Standard deviation of the focal length, relative; ours: 0. With this or one of the next two the intrinsics are estimated, of
     /// Kalibr's models alone. Both axes err together, and a tenth of it each by itself.
     pub focal_sigma: f64,
@@ -46,7 +47,7 @@ impl CalibrationSettings {
         Self {
             camera_position_sigma_m: 0.03,
             camera_attitude_sigma: 0.05,
-            time_offset_sigma_s: 0.015,
+            time_offset_sigma_s: Some(0.015),
             focal_sigma: 0.03,
             principal_point_sigma_px: 10.0,
             distortion_sigma: 0.15,
@@ -62,7 +63,7 @@ impl CalibrationSettings {
         Self {
             camera_position_sigma_m: 0.0,
             camera_attitude_sigma: 0.0,
-            time_offset_sigma_s: 0.0,
+            time_offset_sigma_s: Some(0.0),
             distortion_sigma: 2.0 * self.distortion_sigma,
             ..self
         }
@@ -88,7 +89,7 @@ impl CalibrationSettings {
         Self {
             camera_position_sigma_m: 0.1 * rough.camera_position_sigma_m,
             camera_attitude_sigma: 0.1 * rough.camera_attitude_sigma,
-            time_offset_sigma_s: 0.1 * rough.time_offset_sigma_s,
+            time_offset_sigma_s: rough.time_offset_sigma_s.map(|sigma| 0.1 * sigma),
             focal_sigma: 0.1 * rough.focal_sigma,
             principal_point_sigma_px: 0.1 * rough.principal_point_sigma_px,
             distortion_sigma: 0.1 * rough.distortion_sigma,
@@ -121,7 +122,7 @@ impl CalibrationSettings {
         all_not_negative(&[
             ("camera_position_sigma_m", self.camera_position_sigma_m),
             ("camera_attitude_sigma", self.camera_attitude_sigma),
-            ("time_offset_sigma_s", self.time_offset_sigma_s),
+            ("time_offset_sigma_s", self.time_offset_sigma_s.unwrap_or(0.0)),
             ("stamp_jitter_s", self.stamp_jitter_s),
             ("focal_sigma", self.focal_sigma),
             ("principal_point_sigma_px", self.principal_point_sigma_px),
@@ -141,7 +142,7 @@ mod tests {
     fn lenses_alone_are_tried_with_twice_the_distortion_of_a_rough_guess() {
         let lenses = CalibrationSettings::default().roughly().of_lenses_only();
         assert_eq!((lenses.distortion_sigma, lenses.focal_sigma, lenses.principal_point_sigma_px), (0.3, 0.03, 10.0));
-        let place = [lenses.camera_position_sigma_m, lenses.camera_attitude_sigma, lenses.time_offset_sigma_s];
-        assert_eq!(place, [0.0; 3]);
+        let place = [lenses.camera_position_sigma_m, lenses.camera_attitude_sigma];
+        assert_eq!((place, lenses.time_offset_sigma_s), ([0.0; 2], Some(0.0)));
     }
 }
