@@ -31,12 +31,22 @@ struct Truth {
     distances: Vec<f64>,
 }
 
+/// What is wrong with the first points of a window.
+#[derive(Clone, Copy)]
+enum Mistaken {
+    None,
+    /// So many are drawn along by something that moves.
+    Drawn(usize),
+    /// So many pass the wrong way, as something mirrored does, so many times as far away: there is no distance at which they would.
+    Mirrored(usize, f64),
+}
+
 /// A flight with the given strength of its accelerations, seen for two seconds; half of the points come into sight later.
 fn window(
     agility: f64,
     biases: [Vector3<f64>; 2],
     pixel_sigma: f64,
-    outliers: usize,
+    mistaken: Mistaken,
     seed: usize,
 ) -> (DynamicOutcome, Truth) {
     let knots = (0..60).map(|k| {
@@ -78,12 +88,20 @@ fn window(
             distances.push((camera_pose(images).inverse() * point).coords.norm());
             (k % 2 * 10..=images)
                 .map(|image| {
-                    let seen = (camera_pose(image).inverse() * point).coords;
+                    let mut seen = (camera_pose(image).inverse() * point).coords;
                     let jitter = Vector3::from_fn(|i, _| noise(1000 * k + 50 * image + i + 31 * seed)) * 1.73;
-                    // An outlier is drawn along by something that moves.
-                    let drawn =
-                        if k < outliers { Vector3::new(0.01 * image as f64, 0.0, 0.0) } else { Vector3::zeros() };
-                    (image, (seen.normalize() + drawn + jitter * (pixel_sigma / FOCAL_LENGTH)).normalize())
+                    match mistaken {
+                        Mistaken::Drawn(count) if k < count => {
+                            seen = seen.normalize() + Vector3::new(0.01 * image as f64, 0.0, 0.0);
+                        }
+                        Mistaken::Mirrored(count, farther) if k < count => {
+                            let (first, mut back) = (camera_pose(0), camera_pose(image));
+                            back.translation.vector = 2.0 * first.translation.vector - back.translation.vector;
+                            seen = (back.inverse() * (first * Point3::from(local * farther))).coords.normalize();
+                        }
+                        _ => seen = seen.normalize(),
+                    }
+                    (image, (seen + jitter * (pixel_sigma / FOCAL_LENGTH)).normalize())
                 })
                 .collect()
         })
@@ -121,7 +139,7 @@ const BIASES: [Vector3<f64>; 2] = [Vector3::new(0.02, -0.01, 0.015), Vector3::ne
 fn exact_directions_give_the_exact_motion() {
     let mut started = 0;
     for seed in 0..10 {
-        let (found, truth) = window(0.5, [BIASES[0], Vector3::zeros()], 0.0, 0, seed);
+        let (found, truth) = window(0.5, [BIASES[0], Vector3::zeros()], 0.0, Mistaken::None, seed);
         let Some(found) = converged(found) else { continue };
         started += 1;
         let off = errors(&found, &truth);
@@ -140,7 +158,7 @@ fn exact_directions_give_the_exact_motion() {
 fn noise_is_within_what_is_claimed() {
     let (mut started, mut squares) = (0, [0.0; 4]);
     for seed in 0..60 {
-        let (found, truth) = window(0.4, BIASES, 0.3, 0, seed);
+        let (found, truth) = window(0.4, BIASES, 0.3, Mistaken::None, seed);
         let Some(found) = converged(found) else { continue };
         started += 1;
         let covariance = found.core * found.covariance * found.core.transpose();
@@ -170,7 +188,7 @@ fn noise_is_within_what_is_claimed() {
 #[test]
 fn points_that_move_are_left_out() {
     for seed in 0..10 {
-        let (found, truth) = window(0.5, BIASES, 0.3, 3, seed);
+        let (found, truth) = window(0.5, BIASES, 0.3, Mistaken::Drawn(3), seed);
         let Some(found) = converged(found) else { continue };
         let off = errors(&found, &truth);
         let off = off.fixed_rows::<3>(error_state::VELOCITY).norm();
@@ -183,7 +201,28 @@ fn points_that_move_are_left_out() {
 fn straight_flight_at_constant_speed_is_refused() {
     // Turning, but without acceleration: any scale explains what is seen.
     for seed in 0..10 {
-        let (found, _) = window(0.0, [Vector3::zeros(); 2], 0.3, 0, seed);
+        let (found, _) = window(0.0, [Vector3::zeros(); 2], 0.3, Mistaken::None, seed);
+        assert!(converged(found).is_none(), "{seed}");
+    }
+}
+
+/// What cannot be seen as it is holds up the refinement at the end of the range of distances, until it is left out.
+#[test]
+fn points_that_hold_up_all_are_left_out() {
+    for seed in [1, 2, 11] {
+        let (found, truth) = window(0.5, BIASES, 0.3, Mistaken::Mirrored(3, 1.0), seed);
+        let found = converged(found).unwrap_or_else(|| panic!("{seed}: not started"));
+        let off = errors(&found, &truth).fixed_rows::<3>(error_state::VELOCITY).norm();
+        assert!(off < 0.05 * truth.velocity.norm(), "{seed}: {off}");
+        assert!(found.landmarks.iter().all(|depth| depth.point >= 3), "{seed}");
+    }
+}
+
+/// Points too far to be told from the others, and too many: where the refinement ends is no minimum, and its covariance claims nothing.
+#[test]
+fn no_start_without_a_minimum() {
+    for (agility, farther, seed) in [(0.2, 80.0, 11), (0.2, 320.0, 6), (0.5, 320.0, 11)] {
+        let (found, _) = window(agility, BIASES, 0.3, Mistaken::Mirrored(10, farther), seed);
         assert!(converged(found).is_none(), "{seed}");
     }
 }
