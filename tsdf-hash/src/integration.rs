@@ -11,6 +11,7 @@ pub(crate) mod plane;
 pub(crate) mod plane_image;
 pub(crate) mod plane_tile;
 pub(crate) mod plane_windows;
+pub(crate) mod rims;
 #[cfg(test)]
 mod tests;
 pub(crate) mod voxel_lanes;

@@ -13,8 +13,10 @@ use crate::integration::plane::Plane;
 
 const SOURCE: &str = concat!(include_str!("exact.wgsl"), include_str!("fuse.wgsl"));
 /// Bytes of the program's `Frame`, and of the windows at which it is seen.
-const FRAME_BYTES: usize = 128;
+const FRAME_BYTES: usize = 160;
 const WINDOW: usize = 256;
+/// A plane and a rim.
+const PIXEL_BYTES: usize = 20;
 /// Passes that one submission can hold: one that counts and one for each page.
 const MOST_PASSES: usize = 5;
 /// Marks a slot that holds something else yet.
@@ -89,7 +91,7 @@ impl Fuser {
             ColourData::Rgb8(data) => data.len().div_ceil(4),
             ColourData::Rgb16(data) => data.len().div_ceil(2),
         };
-        let pixels = self.pixels.of(device, 16 * planes.len() + 4 * words)?;
+        let pixels = self.pixels.of(device, PIXEL_BYTES * planes.len() + 4 * words)?;
         // A pixel that is not fused may hold NaN, which a program may take for anything.
         let fused = |plane: &Plane| if plane.scaled_omega > 0.0 { *plane } else { Plane::NONE };
         let plane_words = |plane: &Plane| {
@@ -97,7 +99,8 @@ impl Fuser {
             [offset, scaled_omega, scaled_slope[0], scaled_slope[1]].map(f32::to_bits)
         };
         device.write_groups(pixels, 0, planes.iter().map(plane_words))?;
-        let start = 16 * planes.len();
+        device.write(pixels, 16 * planes.len(), frame.plane_image.rims.rims.iter().map(|rim| rim.0))?;
+        let start = PIXEL_BYTES * planes.len();
         match colours {
             ColourData::Rgb8(data) => {
                 let word = |bytes: &[u8]| bytes.iter().rev().fold(0, |word, &byte| word << 8 | u32::from(byte));
@@ -197,12 +200,16 @@ fn uniform(frame: &Frame, mode: Mode, first: usize, count: usize) -> [u32; FRAME
         words[14..16].copy_from_slice(&colour.last.map(f32::to_bits));
         words[16..18].copy_from_slice(&colour.scale.map(f32::to_bits));
         words[18..20].copy_from_slice(&colour.shift.map(f32::to_bits));
-        words[22] = 4 * plane_image.planes.len() as u32;
+        words[22] = (PIXEL_BYTES / 4 * plane_image.planes.len()) as u32;
         words[23] = if matches!(colour.data, ColourData::Rgb8(_)) { 1 } else { 2 };
         words[28..30].copy_from_slice(&[colour.width as u32, u32::from(colour.is_aligned)]);
     }
     words[20..22].copy_from_slice(&[frame.reach[0], frame.colour_reach].map(f32::to_bits));
     words[30] = frame.reach[1].to_bits();
+    words[31] = 4 * plane_image.planes.len() as u32;
+    let [behind, before] = frame.rim_reach;
+    let lengths = [behind, before, frame.half_voxel, frame.pixel, frame.per_metre];
+    words[32..37].copy_from_slice(&lengths.map(f32::to_bits));
     words[24..27].copy_from_slice(&[mode as u32, first as u32, count as u32]);
     words
 }

@@ -26,6 +26,15 @@ struct Frame {
     // Whether the pixels of the colour image are those of the depth image.
     is_aligned: u32,
     most_ahead: f32,
+    // Words of the frame before its rims.
+    rim_start: u32,
+    // Free space beside rims is known from the one (behind them: negative) to the other in front.
+    rim_behind: f32,
+    rim_before: f32,
+    half_voxel: f32,
+    // A pixel's width at a metre.
+    pixel: f32,
+    per_metre: f32,
 }
 
 // Nothing is written but the count.
@@ -38,6 +47,8 @@ const WEIGHTS: u32 = 512u;
 const COLOURS: u32 = 768u;
 const ONE: i32 = 32767;
 const MAX_COLOURS: u32 = 1040u;
+// Of a rim: how many pixels it is away, in place of the last bits of its depth.
+const RIM_PIXELS: u32 = 255u;
 
 // The slot's bit for a block whose memory holds something else yet.
 const FRESH: u32 = 0x80000000u;
@@ -48,7 +59,7 @@ const OBSERVED: u32 = 0x20000u;
 @group(0) @binding(0) var<uniform> frame: Frame;
 // Projection of the block's first voxel, and its slot.
 @group(0) @binding(1) var<storage, read> blocks: array<vec4<u32>>;
-// Planes of four words, then colours.
+// Planes of four words, then rims, then colours.
 @group(0) @binding(2) var<storage, read> pixels: array<u32>;
 @group(0) @binding(3) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(4) var<storage, read_write> pool: array<u32>;
@@ -126,6 +137,17 @@ fn observe_colour(old: Voxel, change: vec4<u32>) -> Voxel {
     return voxel;
 }
 
+// How far a voxel at a depth is from the rim that its pixel passes, in steps of the stored distance; -1 where that is not known.
+fn beside(rim: u32, depth: f32) -> f32 {
+    let rim_depth = bitcast<f32>(rim & ~RIM_PIXELS);
+    let ahead = minus(rim_depth, depth);
+    if rim == 0u || !(ahead >= frame.rim_behind && ahead <= frame.rim_before) {
+        return -1.0;
+    }
+    let aside = times(times(f32(rim & RIM_PIXELS) - 0.5, frame.pixel), rim_depth);
+    return times(max(max(minus(aside, frame.half_voxel), ahead), 0.0), frame.per_metre);
+}
+
 // What the frame makes of a voxel that projects to (u z, v z, z).
 fn update(old: Voxel, projected: vec3<f32>) -> Voxel {
     let depth = projected.z;
@@ -149,15 +171,21 @@ fn update(old: Voxel, projected: vec3<f32>) -> Voxel {
     let omega = bitcast<f32>(pixels[pixel + 1u]);
     let own = times(depth, omega);
     let ahead = minus(offset, own);
-    if !(omega > 0.0 && ahead >= times(frame.least_ahead, omega) && ahead <= times(frame.most_ahead, omega)) {
+    if !(omega > 0.0 && ahead >= times(frame.least_ahead, omega)) {
+        return old;
+    }
+    let within = ahead <= times(frame.most_ahead, omega);
+    let free = beside(pixels[frame.rim_start + depth_pixel], depth);
+    if !(within || free >= 0.0) {
         return old;
     }
     let along_u = times(bitcast<f32>(pixels[pixel + 2u]), minus(u, pixel_u));
     let along_v = times(bitcast<f32>(pixels[pixel + 3u]), minus(v, pixel_v));
     let distance = minus(offset, times(depth, plus(omega, plus(along_u, along_v))));
-    var voxel = observe(old, distance, pixels[pixel + 3u] & 15u);
+    let least = select(distance, min(distance, free), free >= 0.0);
+    var voxel = observe(old, least, pixels[pixel + 3u] & 15u);
     voxel.mark += 1u;
-    if frame.colour_start > 0u && abs(distance) < frame.colour_reach {
+    if within && frame.colour_start > 0u && abs(distance) < frame.colour_reach {
         let change = colour_at(u, v, depth_pixel);
         if change.w > 0u {
             voxel = observe_colour(voxel, change);

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::blocks::voxel_block::SIDE;
 use crate::integration::plane_image::PlaneImage;
-use crate::integration::plane_tile::{TILE, Tile};
+use crate::integration::plane_tile::{NO_RIMS, TILE, Tile};
 use crate::integration::voxel_lanes::{HALVES, LANES};
 
 /// Blocks closer to the camera's plane are searched voxel by voxel, metres.
@@ -16,10 +16,13 @@ pub(crate) struct BlockBounds {
     pub(crate) step: [f32; 3],
     /// Of a row, from the function at its first voxel: where the lanes of each half can be in the slab.
     pub(crate) bounds: [[f32; 2]; HALVES],
+    /// Depths that voxels beside rims have, metres; the second below the first if there are none.
+    pub(crate) rims: [f32; 2],
 }
 
 impl BlockBounds {
-    const ALL: Self = Self { start: 0.0, step: [0.0; 3], bounds: [[-1.0, 1.0]; HALVES] };
+    const ALL: Self =
+        Self { start: 0.0, step: [0.0; 3], bounds: [[-1.0, 1.0]; HALVES], rims: [f32::NEG_INFINITY, f32::INFINITY] };
 
     /// Where in a block voxels can be touched, from the squares of pixels that it projects to; `None` if nowhere.
     ///
@@ -28,6 +31,7 @@ impl BlockBounds {
     pub(crate) fn under(
         surface: &PlaneImage,
         reach: [f32; 2],
+        rim_reach: [f32; 2],
         start: &Vector3<f32>,
         steps: &[Vector3<f32>; 3],
     ) -> Option<Self> {
@@ -69,6 +73,7 @@ impl BlockBounds {
         if flattest.is_empty() {
             return None;
         }
+        let mut rims = NO_RIMS;
         let omega = flattest.omega;
         let (mut error, mut near) = (0.0_f32, f32::INFINITY);
         for k in lines.0..=lines.1 {
@@ -82,6 +87,7 @@ impl BlockBounds {
                 if !tile.is_empty() {
                     error = error.max(bound);
                     near = near.min(tile.near);
+                    rims = [rims[0].min(tile.rims[0]), rims[1].max(tile.rims[1])];
                 }
             }
         }
@@ -89,14 +95,15 @@ impl BlockBounds {
         // Half a pixel between a voxel's projection and its pixel; and a little for the rounding.
         let error = error + 0.5 * (omega.slope[0].abs() + omega.slope[1].abs());
         let reach = reach.map(|reach| 1.001 * (reach.abs() / near + far * error) + 1e-4);
-        Some(Self::new(1.0 - along(start), [0, 1, 2].map(|k| -along(&steps[k])), reach))
+        let rims = [rims[0] - 1.001 * rim_reach[1], rims[1] - 1.001 * rim_reach[0]];
+        Some(Self::new(1.0 - along(start), [0, 1, 2].map(|k| -along(&steps[k])), reach, rims))
     }
 
-    fn new(start: f32, step: [f32; 3], [behind, front]: [f32; 2]) -> Self {
+    fn new(start: f32, step: [f32; 3], [behind, front]: [f32; 2], rims: [f32; 2]) -> Self {
         let bounds = [0, LANES].map(|x| {
             let ends = [x, x + LANES - 1].map(|x| step[0] * x as f32);
             [-behind - ends[0].max(ends[1]), front - ends[0].min(ends[1])]
         });
-        Self { start, step, bounds }
+        Self { start, step, bounds, rims }
     }
 }

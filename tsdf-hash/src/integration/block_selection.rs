@@ -11,6 +11,7 @@ use crate::hashing::mix64;
 use crate::images::DepthView;
 use crate::integration::plane::Plane;
 use crate::integration::plane_tile::{TILE, Tile};
+use crate::integration::rims::reach;
 use crate::settings::Settings;
 
 /// Keys remembered, to drop most repetitions before sorting.
@@ -36,14 +37,42 @@ pub(crate) fn select_blocks(
         // A little more than that: the voxels are projected in single precision.
         reach: [settings.front(), settings.truncation()].map(|reach| reach * 1.001 + 1e-4 * settings.voxel_size),
         block: settings.block_size(),
-        recent: vec![BlockKey(u64::MAX); RECENT],
-        keys: Vec::new(),
+        found: Covered::new(),
     };
     let across = width.div_ceil(TILE);
     for (k, &tile) in tiles.iter().enumerate() {
         search.tile([k % across * TILE, k / across * TILE], TILE, rows, [tile.near, tile.far])?;
     }
-    Ok(search.keys)
+    Ok(search.found.keys)
+}
+
+/// Keys of the blocks around the rims at some pixels of near surfaces, with their inverse depths.
+pub(crate) fn select_around_rims(
+    sources: impl Iterator<Item = ([usize; 2], f32)>,
+    depth: &DepthView,
+    world_from_camera: &Isometry3<f64>,
+    settings: &Settings,
+) -> Result<Vec<BlockKey>, Error> {
+    let mut keys = Covered::new();
+    let (k, reach) = (&depth.intrinsics, f64::from(reach(settings)[1]));
+    let pixel = (1.0 / k.fx).abs().max((1.0 / k.fy).abs());
+    for ([u, v], omega) in sources {
+        let z = 1.0 / f64::from(omega);
+        let ray = Vector3::new((u as f64 - k.cx) / k.fx, (v as f64 - k.cy) / k.fy, 1.0);
+        let middle = world_from_camera * Point3::from(ray * z);
+        // Along the ray, and to both sides in the image: the last pixel is not cut off, and a voxel may be half a pixel farther.
+        let aside = (reach + 1.5 * pixel * z) * (1.0 + reach / z);
+        let around = Vector3::repeat(ray.norm() * reach + std::f64::consts::SQRT_2 * aside + 1e-4 * z);
+        let [low, high] = [middle - around, middle + around].map(|p| p / settings.block_size());
+        keys.cover(&low, &high)?;
+    }
+    Ok(keys.keys)
+}
+
+/// Keys of blocks, in no order, with repetitions.
+struct Covered {
+    recent: Vec<BlockKey>,
+    keys: Vec<BlockKey>,
 }
 
 struct Search<'a> {
@@ -57,19 +86,22 @@ struct Search<'a> {
     /// In front and behind.
     reach: [f64; 2],
     block: f64,
-    recent: Vec<BlockKey>,
-    keys: Vec<BlockKey>,
+    found: Covered,
 }
 
 impl Search<'_> {
-    /// Looks at a square of pixels whose range of depths is known; it is quartered where that is deeper than a block.
+    /// Looks at a square of pixels whose range of depths is known; where that is deeper than a block, at each slice of its
+    /// quarters in which there are depths.
     fn tile(&mut self, [u, v]: [usize; 2], side: usize, rows: usize, [near, far]: [f32; 2]) -> Result<(), Error> {
         if far < near {
             return Ok(());
         }
         let (right, below) = ((u + side).min(self.depth.width), (v + side).min(rows));
         let (near, far) = (f64::from(near), f64::from(far));
-        if far - near > self.block && side > 1 {
+        if far - near <= self.block {
+            return self.frustum([u, right], [v + self.first_row, below + self.first_row], near, far);
+        }
+        if side == TILE {
             let half = side / 2;
             for corner in [[u, v], [u + half, v], [u, v + half], [u + half, v + half]] {
                 let range = self.range(corner, [(corner[0] + half).min(right), (corner[1] + half).min(below)]);
@@ -77,15 +109,36 @@ impl Search<'_> {
             }
             return Ok(());
         }
-        self.frustum([u, right], [v + self.first_row, below + self.first_row], near, far)
+        let slices = ((far - near) / self.block).ceil().min(f64::from(u64::BITS));
+        let thickness = (far - near) / slices;
+        let seen = self.slices([u, v], [right, below], near, thickness);
+        let mut first = 0;
+        while first < u64::BITS && seen >> first != 0 {
+            let start = first + (seen >> first).trailing_zeros();
+            let end = start + (seen >> start).trailing_ones();
+            let range = [start, end].map(|slice| near + f64::from(slice) * thickness);
+            self.frustum([u, right], [v + self.first_row, below + self.first_row], range[0], range[1])?;
+            first = end;
+        }
+        Ok(())
     }
 
     /// Least and largest depth.
     fn range(&self, from: [usize; 2], to: [usize; 2]) -> [f32; 2] {
-        let width = self.depth.width;
-        let pixels = (from[1]..to[1]).filter_map(|v| self.planes.get(v * width + from[0]..v * width + to[0])).flatten();
-        let depths = pixels.filter_map(Plane::omega).map(|omega| 1.0 / omega);
+        let depths = self.depths(from, to);
         depths.fold([f32::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)])
+    }
+
+    /// In which slices from `near` on there are depths, a bit each.
+    fn slices(&self, from: [usize; 2], to: [usize; 2], near: f64, thickness: f64) -> u64 {
+        let slice = |z: f32| (((f64::from(z) - near) / thickness) as u32).min(u64::BITS - 1);
+        self.depths(from, to).fold(0, |seen, z| seen | 1 << slice(z))
+    }
+
+    fn depths(&self, from: [usize; 2], to: [usize; 2]) -> impl Iterator<Item = f32> {
+        let width = self.depth.width;
+        let pixels = (from[1]..to[1]).filter_map(move |v| self.planes.get(v * width + from[0]..v * width + to[0]));
+        pixels.flatten().filter_map(Plane::omega).map(|omega| 1.0 / omega)
     }
 
     /// Blocks that the bounding boxes of the frustum's slices touch.
@@ -109,17 +162,25 @@ impl Search<'_> {
             for corner in corners {
                 (low, high) = (low.inf(&corner), high.sup(&corner));
             }
-            self.cover(&low.into(), &high.into())?;
+            self.found.cover(&low.into(), &high.into())?;
         }
         Ok(())
     }
+}
 
+impl Covered {
+    fn new() -> Self {
+        Self { recent: vec![BlockKey(u64::MAX); RECENT], keys: Vec::new() }
+    }
+
+    /// Adds the blocks that a box touches, its corners in blocks.
     fn cover(&mut self, low: &Point3<f64>, high: &Point3<f64>) -> Result<(), Error> {
-        let [low, high] = [low, high].map(|p| p.coords.map(f64::floor));
         if low.iter().chain(high.iter()).any(|c| c.abs() > f64::from(1 << 20)) {
             return Err(Error::OutOfRange);
         }
-        let [low, high] = [low, high].map(|p| p.map(|c| c as i32));
+        // `f64::floor` is a call where the processor is not known.
+        let floor = |c: f64| c as i32 - i32::from(c < f64::from(c as i32));
+        let [low, high] = [low, high].map(|p| p.map(floor));
         for x in low.x..=high.x {
             for y in low.y..=high.y {
                 for z in low.z..=high.z {

@@ -9,8 +9,9 @@ use crate::images::{ColourView, DepthView, Intrinsics, check_pose};
 use crate::integration::block_bounds::BlockBounds;
 use crate::integration::colour::{ColourSource, accumulate_colour};
 use crate::integration::plane_image::PlaneImage;
+use crate::integration::rims::{self, Rim};
 use crate::integration::voxel_lanes::{HALVES, LANES, ProjectedVoxels, RowOffsets, mask};
-use crate::rounding::{ROUNDER, rounded};
+use crate::rounding::{ROUNDER, max, rounded};
 use crate::settings::Settings;
 
 /// Colours are taken this close to the surface, in voxels (ours).
@@ -47,6 +48,14 @@ pub(crate) struct Frame<'a> {
     pub(crate) voxel_size: f64,
     /// Voxels are touched this far in front of a surface, from the one (behind it: `-μ`) to the other, metres.
     pub(crate) reach: [f32; 2],
+    /// Free space beside rims is known from the one (behind them) to the other in front, metres.
+    pub(crate) rim_reach: [f32; 2],
+    /// Half a voxel, metres.
+    pub(crate) half_voxel: f32,
+    /// A pixel's width at a metre, metres.
+    pub(crate) pixel: f32,
+    /// Steps of the stored distance per metre.
+    pub(crate) per_metre: f32,
     /// In steps of the stored distance.
     pub(crate) colour_reach: f32,
     width: i32,
@@ -72,6 +81,10 @@ impl<'a> Frame<'a> {
             offset: pixels_from_camera * camera_from_world.translation.vector,
             voxel_size: settings.voxel_size,
             reach: [-settings.truncation(), settings.front()].map(|reach| reach as f32),
+            rim_reach: rims::reach(settings),
+            half_voxel: (0.5 * settings.voxel_size) as f32,
+            pixel: (1.0 / k.fx.abs().max(k.fy.abs())) as f32,
+            per_metre: (f64::from(ONE) / settings.truncation()) as f32,
             width: plane_image.width as i32,
             last: [plane_image.width, plane_image.height].map(|side| (side - 1) as f32),
             colour_reach: (f64::from(ONE) * COLOUR_REACH / settings.truncation_voxels) as f32,
@@ -126,10 +139,15 @@ impl<'a> Frame<'a> {
     ///                p.z > 0, 0 <= i <= width - 1, 0 <= j <= height - 1, or the voxel is not touched
     ///                plane = planes[i + width j]
     ///                own = p.z scaled_omega
-    ///                -μ scaled_omega <= offset - own <= front scaled_omega, or the voxel is not touched
+    ///                -μ scaled_omega <= offset - own, or the voxel is not touched
+    ///                within = offset - own <= front scaled_omega
+    ///                rim = rims[i + width j]
+    ///                beside = there is a rim, -behind <= rim.depth - p.z <= before
+    ///                within or beside, or the voxel is not touched
     ///                du = u - i;  dv = v - j
     ///                q = offset - p.z (scaled_omega + (slope_u du + slope_v dv))
-    ///                coloured = |q| < reach
+    ///                coloured = within, |q| < reach
+    ///                if beside, q = min(q, max((rim.pixels - 1/2) pixel rim.depth - h/2, rim.depth - p.z, 0) per_metre)
     ///                q = round(min(max(q, -32767), 32767))
     ///                w = the last four bits of slope_v
     ///                S += w q;  W += w                               in integers
@@ -138,21 +156,46 @@ impl<'a> Frame<'a> {
     /// `front` is `μ`, or the distance that is carved if that is larger. `start` and the steps are computed in double precision and rounded once.
     fn update<const INTEGRATE: bool>(&self, key: BlockKey, block: &mut VoxelBlock) -> UpdateCount {
         let (start, step) = (self.start(key), self.step());
-        let [sx, sy, sz] = [0, 1, 2].map(|axis| step.column(axis).into_owned());
-        let steps = [sx, sy, sz];
-        let Some(bounds) = BlockBounds::under(self.plane_image, self.reach, &start, &steps) else {
+        let steps = [0, 1, 2].map(|axis| step.column(axis).into_owned());
+        let Some(bounds) = BlockBounds::under(self.plane_image, self.reach, self.rim_reach, &start, &steps) else {
             return UpdateCount::default();
         };
-        let offsets = [0, LANES].map(|first| RowOffsets::new(&sx, first));
+        if bounds.rims[0] <= bounds.rims[1] {
+            self.update_rows::<INTEGRATE, true>(block, &start, &steps, &bounds)
+        } else {
+            self.update_rows::<INTEGRATE, false>(block, &start, &steps, &bounds)
+        }
+    }
+
+    #[inline(always)]
+    fn update_rows<const INTEGRATE: bool, const RIMS: bool>(
+        &self,
+        block: &mut VoxelBlock,
+        start: &Vector3<f32>,
+        steps: &[Vector3<f32>; 3],
+        bounds: &BlockBounds,
+    ) -> UpdateCount {
+        let [sx, sy, sz] = steps;
+        let offsets = [0, LANES].map(|first| RowOffsets::new(sx, first));
         let mut counts = LaneCounts::default();
         for z in 0..SIDE {
             for y in 0..SIDE {
                 let along = bounds.start + bounds.step[1] * y as f32 + bounds.step[2] * z as f32;
                 let row = (start + sy * y as f32) + sz * z as f32;
                 for (half, (offsets, [least, most])) in offsets.iter().zip(bounds.bounds).enumerate() {
-                    if along >= least && along <= most {
+                    let beside = RIMS && {
+                        let ends = [offsets.depth[0], offsets.depth[LANES - 1]].map(|depth| row.z + depth);
+                        ends[0].max(ends[1]) >= bounds.rims[0] && ends[0].min(ends[1]) <= bounds.rims[1]
+                    };
+                    let near = along >= least && along <= most;
+                    if near || beside {
                         let lanes = self.project(&row, offsets);
-                        self.accumulate::<INTEGRATE>(block, half + HALVES * (y + SIDE * z), &lanes, &mut counts);
+                        if !near
+                            && lanes.index.iter().all(|&pixel| self.plane_image.rims.rims[pixel as usize] == Rim::NONE)
+                        {
+                            continue;
+                        }
+                        self.accumulate::<INTEGRATE, RIMS>(block, half + HALVES * (y + SIDE * z), &lanes, &mut counts);
                     }
                 }
             }
@@ -189,9 +232,20 @@ impl<'a> Frame<'a> {
         out
     }
 
+    /// Whether it is known how far a voxel at a depth is from the rim that its pixel passes, and how far, in steps of the
+    /// stored distance.
+    #[inline(always)]
+    fn beside(&self, rim: Rim, depth: f32) -> (i32, f32) {
+        let ahead = rim.depth() - depth;
+        let known = mask(rim != Rim::NONE) & mask(ahead >= self.rim_reach[0]) & mask(ahead <= self.rim_reach[1]);
+        // The rim is between two pixels.
+        let aside = (rim.pixels() as i32 as f32 - 0.5) * self.pixel * rim.depth();
+        (known, max(max(aside - self.half_voxel, ahead), 0.0) * self.per_metre)
+    }
+
     /// Updates the voxels `LANES unit..`.
     #[inline(always)]
-    fn accumulate<const INTEGRATE: bool>(
+    fn accumulate<const INTEGRATE: bool, const RIMS: bool>(
         &self,
         block: &mut VoxelBlock,
         unit: usize,
@@ -203,12 +257,23 @@ impl<'a> Frame<'a> {
         let omega = planes.map(|plane| plane.scaled_omega);
         let slope_u = planes.map(|plane| plane.scaled_slope[0]);
         let slope_v = planes.map(|plane| plane.scaled_slope[1]);
-        let mut touched = [0; LANES];
+        let (mut touched, mut own) = ([0; LANES], [0; LANES]);
         for x in 0..LANES {
             // A NaN fails, and so does an omega of 0.
             let ahead = offset[x] - lanes.depth[x] * omega[x];
             let within = mask(ahead >= self.reach[0] * omega[x]) & mask(ahead <= self.reach[1] * omega[x]);
-            touched[x] = within & lanes.inside[x];
+            own[x] = within & lanes.inside[x];
+            touched[x] = own[x];
+        }
+        let mut beside = [f32::INFINITY; LANES];
+        if RIMS {
+            let rims = lanes.index.map(|index| self.plane_image.rims.rims[index as usize]);
+            for x in 0..LANES {
+                let in_front = mask(offset[x] - lanes.depth[x] * omega[x] >= self.reach[0] * omega[x]);
+                let (known, distance) = self.beside(rims[x], lanes.depth[x]);
+                beside[x] = if known != 0 { distance } else { f32::INFINITY };
+                touched[x] |= known & in_front & lanes.inside[x];
+            }
         }
         if touched == [0; LANES] {
             return;
@@ -219,7 +284,8 @@ impl<'a> Frame<'a> {
         for x in 0..LANES {
             let at_voxel = omega[x] + (slope_u[x] * lanes.du[x] + slope_v[x] * lanes.dv[x]);
             let q = offset[x] - lanes.depth[x] * at_voxel;
-            coloured[x] = mask(q.abs() < self.colour_reach) & touched[x];
+            coloured[x] = mask(q.abs() < self.colour_reach) & own[x];
+            let q = if RIMS && beside[x] < q { beside[x] } else { q };
             let q = if q > -LIMIT { q } else { -LIMIT };
             let q = if q < LIMIT { q } else { LIMIT };
             let weight = slope_v[x].to_bits().cast_signed() & 15 & touched[x];

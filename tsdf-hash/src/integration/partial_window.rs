@@ -26,49 +26,98 @@ impl PartialWindow {
         Self { noise, steepest: [k.fx, k.fy].map(|f| STEEPEST / f.abs() as f32) }
     }
 
-    /// Slopes of the inverse depth at pixel `u` of the middle line, per pixel; `None` if too few pixels lie on its surface.
+    /// Slopes of the inverse depth at the pixels `u..` of the middle line, per pixel; NaN if too few pixels lie on the surface
+    /// of one.
     ///
     /// First all count that a surface through the pixel can reach, then those within the noise of the plane fitted to them.
-    pub(crate) fn slopes(&self, lines: [&[f32]; SIDE], u: usize) -> Option<[f32; 2]> {
-        let window = lines.map(|line| &line[u + HALO - SIDE / 2..][..SIDE]);
+    pub(crate) fn slopes(&self, lines: [&[f32]; SIDE], u: usize) -> [Lanes; 2] {
+        let window = lines.map(|line| {
+            let line = &line[u + HALO - SIDE / 2..][..SIDE + LANES - 1];
+            let column = |x: usize| lanes(|k| line[x + k]);
+            [column(0), column(1), column(2), column(3), column(4)]
+        });
         let own = window[SIDE / 2][SIDE / 2];
-        let granted = GRANTED * self.noise.sigma_inverse(own);
-        let steepest = self.steepest.map(|slope| slope * own);
-        let first = fit(window, |w, x, y| (w - own).abs() <= granted + steepest[0] * x.abs() + steepest[1] * y.abs())?;
-        let fine = fit(window, |w, x, y| (w - own - first.slope[0] * x - first.slope[1] * y).abs() <= granted)?;
-        ((fine.middle - own).abs() <= granted).then_some(fine.slope)
+        let granted = lanes(|k| GRANTED * self.noise.sigma_inverse(own[k]));
+        let steepest = self.steepest.map(|slope| lanes(|k| slope * own[k]));
+        let first = fit(&window, [[0.0; LANES]; 2], granted, steepest);
+        let fine = fit(&window, first.slope, granted, [[0.0; LANES]; 2]);
+        let is_good =
+            |k: usize| first.n[k] >= LEAST_PIXELS && fine.n[k] >= LEAST_PIXELS && fine.middle[k].abs() <= granted[k];
+        fine.slope.map(|slope| lanes(|k| if is_good(k) { slope[k] } else { f32::NAN }))
     }
+}
+
+/// Neighbouring pixels whose windows are summed side by side: a vector register.
+pub(crate) const LANES: usize = 4;
+type Lanes = [f32; LANES];
+
+#[inline(always)]
+fn lanes(value: impl FnMut(usize) -> f32) -> Lanes {
+    std::array::from_fn(value)
+}
+
+#[inline(always)]
+fn sum(a: Lanes, b: Lanes) -> Lanes {
+    lanes(|k| a[k] + b[k])
+}
+
+#[inline(always)]
+fn scaled(factor: f32, a: Lanes) -> Lanes {
+    lanes(|k| factor * a[k])
+}
+
+/// `Σ i x_i` for `i = -2..=2`.
+#[inline(always)]
+fn moment(x: [Lanes; SIDE]) -> Lanes {
+    lanes(|k| 2.0 * (x[4][k] - x[0][k]) + (x[3][k] - x[1][k]))
 }
 
 struct Fit {
-    middle: f32,
-    slope: [f32; 2],
+    /// Pixels on the surface.
+    n: Lanes,
+    /// From the pixel's own inverse depth.
+    middle: Lanes,
+    slope: [Lanes; 2],
 }
 
-/// Least squares over the pixels that are taken.
-fn fit(window: [&[f32]; SIDE], take: impl Fn(f32, f32, f32) -> bool) -> Option<Fit> {
+/// Least squares over the pixels that are no farther from a plane through the middle one than is granted.
+#[inline(always)]
+fn fit(window: &[[Lanes; SIDE]; SIDE], tilt: [Lanes; 2], granted: Lanes, steepest: [Lanes; 2]) -> Fit {
     let own = window[SIDE / 2][SIDE / 2];
-    let (mut n, mut sx, mut sy, mut sw) = (0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32);
-    let (mut sxx, mut sxy, mut syy, mut sxw, mut syw) = (0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32);
+    let zero = [0.0; LANES];
+    let [mut n, mut sx, mut sy, mut sw] = [zero; 4];
+    let [mut sxx, mut sxy, mut syy, mut sxw, mut syw] = [zero; 5];
     for (row, line) in window.iter().enumerate() {
-        for (column, &value) in line.iter().enumerate() {
-            let (x, y) = (column as f32 - (SIDE / 2) as f32, row as f32 - (SIDE / 2) as f32);
-            // A NaN is not taken.
-            if take(value, x, y) {
-                let w = value - own;
-                (n, sx, sy, sw) = (n + 1.0, sx + x, sy + y, sw + w);
-                (sxx, sxy, syy) = (sxx + x * x, sxy + x * y, syy + y * y);
-                (sxw, syw) = (sxw + x * w, syw + y * w);
+        let y = row as f32 - (SIDE / 2) as f32;
+        // Ones and inverse depths of the pixels that are taken.
+        let (mut ones, mut values) = ([zero; SIDE], [zero; SIDE]);
+        for (column, w) in line.iter().enumerate() {
+            let x = column as f32 - (SIDE / 2) as f32;
+            for k in 0..LANES {
+                let value = w[k] - own[k];
+                let off = (value - tilt[0][k] * x - tilt[1][k] * y).abs();
+                // A NaN is not taken.
+                let taken = off <= granted[k] + steepest[0][k] * x.abs() + steepest[1][k] * y.abs();
+                let taken = u32::from(taken).wrapping_neg();
+                ones[column][k] = f32::from_bits(1.0_f32.to_bits() & taken);
+                values[column][k] = f32::from_bits(value.to_bits() & taken);
             }
         }
+        let total = |x: [Lanes; SIDE]| lanes(|k| ((x[0][k] + x[4][k]) + (x[1][k] + x[3][k])) + x[2][k]);
+        let (count, value, along) = (total(ones), total(values), moment(ones));
+        let squares = lanes(|k| 4.0 * (ones[0][k] + ones[4][k]) + (ones[1][k] + ones[3][k]));
+        (n, sx, sy, sw) = (sum(n, count), sum(sx, along), sum(sy, scaled(y, count)), sum(sw, value));
+        (sxx, sxy, syy) = (sum(sxx, squares), sum(sxy, scaled(y, along)), sum(syy, scaled(y * y, count)));
+        (sxw, syw) = (sum(sxw, moment(values)), sum(syw, scaled(y, value)));
     }
-    if n < LEAST_PIXELS {
-        return None;
+    let (mut middle, mut slope) = (zero, [zero; 2]);
+    for k in 0..LANES {
+        let (mx, my) = (sx[k] / n[k], sy[k] / n[k]);
+        let (a, b, d) = (sxx[k] - sx[k] * mx + RIDGE, sxy[k] - sx[k] * my, syy[k] - sy[k] * my + RIDGE);
+        let (p, q) = (sxw[k] - sw[k] * mx, syw[k] - sw[k] * my);
+        let determinant = a * d - b * b;
+        (slope[0][k], slope[1][k]) = ((d * p - b * q) / determinant, (a * q - b * p) / determinant);
+        middle[k] = sw[k] / n[k] - slope[0][k] * mx - slope[1][k] * my;
     }
-    let (mx, my) = (sx / n, sy / n);
-    let (a, b, d) = (sxx - sx * mx + RIDGE, sxy - sx * my, syy - sy * my + RIDGE);
-    let (p, q) = (sxw - sw * mx, syw - sw * my);
-    let determinant = a * d - b * b;
-    let slope = [(d * p - b * q) / determinant, (a * q - b * p) / determinant];
-    Some(Fit { middle: own + sw / n - slope[0] * mx - slope[1] * my, slope })
+    Fit { n, middle, slope }
 }

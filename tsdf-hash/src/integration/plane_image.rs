@@ -9,12 +9,13 @@ use crate::blocks::block_key::BlockKey;
 use crate::blocks::voxel_block::{MAX_WEIGHT, ONE};
 use crate::error::Error;
 use crate::images::{DepthView, Intrinsics};
-use crate::integration::block_selection::select_blocks;
+use crate::integration::block_selection::{select_around_rims, select_blocks};
 use crate::integration::inverse_depth_noise::InverseDepthNoise;
-use crate::integration::partial_window::PartialWindow;
+use crate::integration::partial_window::{LANES, PartialWindow};
 use crate::integration::plane::Plane;
 use crate::integration::plane_tile::{TILE, Tile, TileLine};
 use crate::integration::plane_windows::{BEND_VARIANCE, BENDING, COUNT, ROUGHNESS, Row, SPREAD, Windows};
+use crate::integration::rims::RimImage;
 use crate::parallel::in_chunks;
 use crate::rounding::ROUNDER;
 use crate::settings::Settings;
@@ -36,6 +37,8 @@ pub(crate) struct PlaneImage {
     pub(crate) planes: Vec<Plane>,
     /// The fused depths in squares of [`TILE`] pixels, row-major.
     pub(crate) tiles: Vec<Tile>,
+    /// The free space beside the rims of near surfaces.
+    pub(crate) rims: RimImage,
     /// Pixels with a depth in the range.
     pub(crate) valid: usize,
     /// Those of them that are fused.
@@ -74,31 +77,57 @@ impl PlaneImage {
             .map(|(k, (planes, tiles))| Band { first: k * lines * TILE, planes, tiles })
             .collect();
         let found = in_chunks(&mut bands, settings.threads, |bands| {
-            let mut all = ([0; 3], Ok(Vec::new()));
+            let mut all = ([0; 3], Ok(Vec::new()), Vec::new());
             for band in bands {
-                let counts = band.fill(depth, settings);
+                let (counts, edges) = band.fill(depth, settings);
                 let keys = select_blocks(band.first, band.planes, band.tiles, depth, world_from_camera, settings);
-                all = ([0, 1, 2].map(|k| all.0[k] + counts[k]), keys);
+                all = ([0, 1, 2].map(|k| all.0[k] + counts[k]), keys, edges);
             }
             all
         });
         (self.valid, self.fused, self.filled) = (0, 0, 0);
         self.keys.clear();
-        for ([valid, fused, filled], keys) in found {
+        let mut all_edges = Vec::new();
+        for ([valid, fused, filled], keys, edges) in found {
             self.valid += valid;
             self.fused += fused;
             self.filled += filled;
             self.keys.extend(keys?);
+            all_edges.extend(edges);
         }
+        self.find_rims(&all_edges, depth, world_from_camera, settings)?;
         self.keys.sort_unstable();
         self.keys.dedup();
         if self.fused == 0 { Err(Error::NoDepth { valid: self.valid }) } else { Ok(()) }
+    }
+
+    /// Finds the rims among the pixels beside edges, tells the tiles, and adds the blocks around them.
+    fn find_rims(
+        &mut self,
+        edges: &[u32],
+        depth: &DepthView,
+        world_from_camera: &Isometry3<f64>,
+        settings: &Settings,
+    ) -> Result<(), Error> {
+        self.rims.find(self.width, &self.planes, edges, &depth.intrinsics, settings);
+        let across = self.width.div_ceil(TILE);
+        for &pixel in &self.rims.beside {
+            let (pixel, z) = (pixel as usize, self.rims.rims[pixel as usize].depth());
+            let range = &mut self.tiles[pixel / self.width / TILE * across + pixel % self.width / TILE].rims;
+            *range = [range[0].min(z), range[1].max(z)];
+        }
+        let sources = self.rims.sources.iter().filter_map(|&pixel| {
+            let pixel = pixel as usize;
+            Some(([pixel % self.width, pixel / self.width], self.planes[pixel].omega()?))
+        });
+        self.keys.extend(select_around_rims(sources, depth, world_from_camera, settings)?);
+        Ok(())
     }
 }
 
 impl Band<'_> {
     /// Returns how many pixels of the band have a depth in the range, how many of them are fused, and how many gaps are filled.
-    fn fill(&mut self, depth: &DepthView, settings: &Settings) -> [usize; 3] {
+    fn fill(&mut self, depth: &DepthView, settings: &Settings) -> ([usize; 3], Vec<u32>) {
         let width = depth.width;
         let noise = InverseDepthNoise::new(settings);
         let per_metre = (f64::from(ONE) / settings.truncation()) as f32;
@@ -106,6 +135,7 @@ impl Band<'_> {
         let (mut columns, mut tile_line) = (Columns::new(width), TileLine::new(width));
         let partial = PartialWindow::new(&depth.intrinsics, noise);
         let mut all = [0; 3];
+        let mut edges = Vec::new();
         let lines = self.planes.chunks_mut(TILE * width).zip(self.tiles.chunks_mut(width.div_ceil(TILE)));
         for (line, (planes, tiles)) in lines.enumerate() {
             for (row, planes) in planes.chunks_exact_mut(width).enumerate() {
@@ -113,7 +143,8 @@ impl Band<'_> {
                 let lens = Lens::new(&depth.intrinsics, self.first + row, per_metre);
                 let line = windows.row(row);
                 read_row(&line, lens, noise, &mut columns);
-                read_edges(&line, lens, noise, partial, &mut columns);
+                let start = ((self.first + row) * width) as u32;
+                read_edges(&line, lens, noise, partial, &mut columns, |u| edges.push(start + u as u32));
                 let counts = count(line.measured, &columns.omega);
                 columns.write(planes);
                 tile_line.push(&columns.omega);
@@ -121,7 +152,7 @@ impl Band<'_> {
             }
             tile_line.finish(self.first + line * TILE, planes, tiles);
         }
-        all
+        (all, edges)
     }
 }
 
@@ -180,15 +211,31 @@ fn read_row(row: &Row, lens: Lens, noise: InverseDepthNoise, out: &mut Columns) 
 }
 
 /// The pixels beside gaps and edges that [`read_row`] has left out.
-fn read_edges(row: &Row, lens: Lens, noise: InverseDepthNoise, partial: PartialWindow, out: &mut Columns) {
-    for u in 0..out.omega.len() {
-        if row.measured[u] > 0.0
-            && row.smooth[u].is_nan()
-            && let Some(slope) = partial.slopes(row.wide, u)
-        {
+fn read_edges(
+    row: &Row,
+    lens: Lens,
+    noise: InverseDepthNoise,
+    partial: PartialWindow,
+    out: &mut Columns,
+    mut found: impl FnMut(usize),
+) {
+    let width = out.omega.len();
+    let is_edge = |u: usize| row.measured[u] > 0.0 && row.smooth[u].is_nan();
+    for first in (0..width).step_by(LANES) {
+        let group = first..(first + LANES).min(width);
+        if !group.clone().any(is_edge) {
+            continue;
+        }
+        let [along, down] = partial.slopes(row.wide, first);
+        for u in group.filter(|&u| is_edge(u)) {
+            let slope = [along, down].map(|slope| slope[u - first]);
+            if slope[0].is_nan() {
+                continue;
+            }
             let seen = observe(lens, noise, u, row.measured[u], slope);
             (out.offset[u], out.omega[u]) = (seen.offset, seen.omega);
             (out.slope[0][u], out.slope[1][u]) = (seen.slope_u, seen.slope_v);
+            found(u);
         }
     }
 }

@@ -7,6 +7,9 @@ use crate::integration::plane::Plane;
 /// Edge of a square, pixels.
 pub(crate) const TILE: usize = 8;
 
+/// Of a square without rims.
+pub(crate) const NO_RIMS: [f32; 2] = [f32::INFINITY, 0.0];
+
 /// The fused pixels of a square.
 #[derive(Clone, Copy)]
 pub(crate) struct Tile {
@@ -17,6 +20,8 @@ pub(crate) struct Tile {
     /// Their inverse depths, 1/m, are within `error` of this linear function.
     pub(crate) omega: Linear,
     pub(crate) error: f32,
+    /// Least and largest depth of the rims beside which they are, metres; the largest below the least if there is none.
+    pub(crate) rims: [f32; 2],
 }
 
 /// `base + slope · (u, v)`.
@@ -38,7 +43,7 @@ impl Linear {
 
 impl Tile {
     pub(crate) const EMPTY: Self =
-        Self { near: f32::INFINITY, far: 0.0, omega: Linear { base: 0.0, slope: [0.0; 2] }, error: 0.0 };
+        Self { near: f32::INFINITY, far: 0.0, omega: Linear { base: 0.0, slope: [0.0; 2] }, error: 0.0, rims: NO_RIMS };
 
     pub(crate) fn is_empty(&self) -> bool {
         self.far < self.near
@@ -95,7 +100,11 @@ impl TileLine {
                 Some(omega) => Linear::through(omega, plane.scaled_slope.map(|s| s / plane.offset), [u, first + v]),
                 None => Linear { base: f32::midpoint(low.min(high), high), slope: [0.0; 2] },
             };
-            *tile = if high > 0.0 { Tile { near: 1.0 / high, far: 1.0 / low, omega, error: 0.0 } } else { Tile::EMPTY };
+            *tile = if high > 0.0 {
+                Tile { near: 1.0 / high, far: 1.0 / low, omega, error: 0.0, rims: NO_RIMS }
+            } else {
+                Tile::EMPTY
+            };
             for u in columns {
                 self.base[u] = omega.at(u as f32, first as f32);
                 self.down[u] = omega.slope[1];

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use crate::images::Intrinsics;
 use crate::ray_cast::pixel::UNSEEN;
 use crate::ray_cast::view::View;
 use crate::tracking::image_level::grey;
@@ -17,6 +18,8 @@ pub(crate) struct ModelPoint {
 
 /// Points along each side of a tile.
 const TILE: usize = 8;
+/// What is so many voxels behind a point a voxel beside it is another surface: a plane seen at 76 degrees (ours).
+const RIM_DEPTH: f64 = 4.0;
 
 /// The points of a view, tile by tile: what is wrong with the map is alike within a tile.
 #[derive(Clone, Debug, Default)]
@@ -35,7 +38,10 @@ impl Model {
 
 /// The points of every `stride`-th pixel of a view along each side; intensities are means over `2 radius + 1` pixels along each
 /// side.
-pub(crate) fn model_points(view: &View, stride: usize, radius: usize, out: &mut Model) {
+///
+/// Points at rims are left out: where a surface ends is known to a voxel, and differently from each side, so that a rim would hold
+/// a pose where it was rounded off, along directions that nothing else fixes.
+pub(crate) fn model_points(view: &View, voxel_size: f64, stride: usize, radius: usize, out: &mut Model) {
     out.points.clear();
     out.ends.clear();
     let Some(k) = view.intrinsics else { return };
@@ -47,7 +53,7 @@ pub(crate) fn model_points(view: &View, stride: usize, radius: usize, out: &mut 
                 for u in (column + stride / 2..view.width.min(column + side)).step_by(stride) {
                     let at = v * view.width + u;
                     let z = f64::from(view.depth[at]);
-                    if z > 0.0 {
+                    if z > 0.0 && !is_at_rim(view, [u, v], &k, voxel_size) {
                         let ray = Vector3::new((u as f64 - k.cx) / k.fx, (v as f64 - k.cy) / k.fy, 1.0);
                         let position = (rotation * ray * z).cast::<f32>().into();
                         let intensity = intensity(view, u, v, radius);
@@ -60,6 +66,19 @@ pub(crate) fn model_points(view: &View, stride: usize, radius: usize, out: &mut 
             }
         }
     }
+}
+
+/// Whether a voxel beside a point there is a surface far behind it.
+fn is_at_rim(view: &View, [u, v]: [usize; 2], k: &Intrinsics, voxel_size: f64) -> bool {
+    let at = v * view.width + u;
+    let z = f64::from(view.depth[at]);
+    let behind = (z + RIM_DEPTH * voxel_size) as f32;
+    let [across, down] = [k.fx, k.fy].map(|f| (voxel_size * f.abs() / z).ceil() as usize);
+    let is_behind = |is_there: bool, at: usize| is_there && view.depth[at] > behind;
+    is_behind(u >= across, at.wrapping_sub(across))
+        || is_behind(u + across < view.width, at + across)
+        || is_behind(v >= down, at.wrapping_sub(down * view.width))
+        || is_behind(v + down < view.height, at + down * view.width)
 }
 
 /// Mean grey around a pixel; NaN if one of them is unseen.

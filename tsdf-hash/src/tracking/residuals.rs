@@ -131,6 +131,11 @@ impl Evaluation {
 }
 
 impl Comparison<'_> {
+    /// Metres.
+    pub(crate) fn voxel_size(&self) -> f64 {
+        2.0 * f64::from(self.tolerance)
+    }
+
     /// Compares at a pose; `brightness` is what the frame is brighter than the model, grey levels.
     pub(crate) fn evaluate(&self, pose: &Isometry3<f64>, scales: Scales, brightness: f32) -> Evaluation {
         let task = Task::new(self, pose, scales, brightness);

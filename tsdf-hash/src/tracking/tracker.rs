@@ -251,7 +251,7 @@ impl Tracker {
             colour.check()?;
         }
         check_pose(&prior.world_from_camera)?;
-        self.read(view, depth, colour);
+        self.read(view, voxel_size, depth, colour);
         let settings = &self.settings;
         let mut search = Registration::new(prior.world_from_camera);
         let mut last = None;
@@ -287,7 +287,7 @@ impl Tracker {
         }
     }
 
-    fn read(&mut self, view: &View, depth: &DepthView, colour: Option<&ColourView>) {
+    fn read(&mut self, view: &View, voxel_size: f64, depth: &DepthView, colour: Option<&ColourView>) {
         let range = [1e-3, 1e3];
         let [fine, middle, coarse] = &mut self.levels;
         fine.read(depth, colour, self.settings.reduction(depth.width), range);
@@ -295,7 +295,7 @@ impl Tracker {
         middle.halve(coarse);
         // The finest level takes every other point: neighbours say nearly the same.
         for (model, (stride, radius)) in self.models.iter_mut().zip([(FINE_STRIDE, 0), (2, 1), (4, 2)]) {
-            model_points(view, stride, radius, model);
+            model_points(view, voxel_size, stride, radius, model);
         }
     }
 
@@ -388,15 +388,14 @@ fn spread(covariance: &Matrix6<f64>, view: &View) -> f64 {
 
 /// Variance of what a tile of the map is off, square metres.
 fn map_variance(comparison: &Comparison) -> f64 {
-    let voxel = 2.0 * f64::from(comparison.tolerance);
-    (MAP_ERROR[0] * voxel).powi(2) + (MAP_ERROR[1] * comparison.noise.base).powi(2)
+    (MAP_ERROR[0] * comparison.voxel_size()).powi(2) + (MAP_ERROR[1] * comparison.noise.base).powi(2)
 }
 
 /// Variance of the model's normals by the noise that was fused, radians squared, `scale` times that of the noise model: the weight of a voxel says how much noise is left.
 fn scatter(view: &View, comparison: &Comparison, scale: f64) -> f64 {
     let weights = view.weights.iter().filter(|w| **w > 0);
     let (sum, count) = weights.fold((0.0, 0.0), |(sum, count), w| (sum + 1.0 / f64::from(*w), count + 1.0_f64));
-    let step = comparison.noise.base * scale / (2.0 * f64::from(comparison.tolerance));
+    let step = comparison.noise.base * scale / comparison.voxel_size();
     f64::from(MAX_WEIGHT) * step * step * sum / count.max(1.0)
 }
 

@@ -10,9 +10,9 @@ use crate::scene::{Shot, hit_sphere};
 
 const FRAMES: usize = 30;
 
-/// Follows a camera around a ball of 40 cm, 36 mm a frame, before walls at `half` its size along each axis; returns what became of each frame, and
-/// by how much it is off.
-fn around_a_ball(half: [f64; 3]) -> Vec<(FrameOutcome, Option<f64>)> {
+/// Follows a camera around a ball of 40 cm, 36 mm a frame, from the tenth on turning about its own axis as well, before walls at `half` its size
+/// along each axis; returns what became of each frame, and by how much it is off, metres and radians.
+fn around_a_ball(half: [f64; 3]) -> Vec<(FrameOutcome, Option<(f64, f64)>)> {
     let hit = |o: &Point3<f64>, d: &Vector3<f64>| {
         let walls = (0..3).map(|k| (if d[k] > 0.0 { half[k] - o[k] } else { -half[k] - o[k] }) / d[k]);
         let wall = walls.fold(f64::INFINITY, f64::min);
@@ -23,13 +23,14 @@ fn around_a_ball(half: [f64; 3]) -> Vec<(FrameOutcome, Option<f64>)> {
     let pose = |k: usize| {
         let angle = 0.036 * k as f64;
         let eye = Vector3::new(angle.sin(), 0.0, -angle.cos());
-        Isometry3::from_parts(eye.into(), UnitQuaternion::face_towards(&-eye, &Vector3::y()))
+        let roll = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.02 * k.saturating_sub(10) as f64);
+        Isometry3::from_parts(eye.into(), UnitQuaternion::face_towards(&-eye, &Vector3::y()) * roll)
     };
     (0..FRAMES)
         .map(|k| {
             let shot = Shot::take((320, 240), [262.5; 2], pose(k), hit);
             let outcome = slam.frame(k as f64 / 30.0, &shot.view(), None, (k == 0).then(|| pose(0)).as_ref()).unwrap();
-            let off = outcome.world_from_camera.map(|found| apart(&found, &pose(k)).0);
+            let off = outcome.world_from_camera.map(|found| apart(&found, &pose(k)));
             (outcome, off)
         })
         .collect()
@@ -39,16 +40,24 @@ fn around_a_ball(half: [f64; 3]) -> Vec<(FrameOutcome, Option<f64>)> {
 #[test]
 fn far_walls_fix_what_a_near_ball_does_not() {
     for (outcome, off) in around_a_ball([2.2, 0.8, 2.2]) {
-        assert!(off.is_some_and(|off| off < 0.01), "{off:?} {outcome:?}");
+        assert!(off.is_some_and(|(metres, _)| metres < 0.01), "{off:?} {outcome:?}");
     }
 }
 
-/// Before one wall, nothing fixes the turn about the ball's axis: no frame is fused along a guess.
+/// Before one wall, nothing fixes the turn about the ball's axis but the rims of what was seen: no frame is fused along a guess. The
+/// first one hides the same of the wall however the camera turns.
 #[test]
 fn what_nothing_fixes_is_left_out() {
-    for (outcome, off) in around_a_ball([2.2; 3]).into_iter().skip(1) {
+    for (k, (outcome, off)) in around_a_ball([2.2; 3]).into_iter().skip(1).enumerate() {
         let tracking = outcome.tracking.as_ref().unwrap();
-        assert_eq!((tracking.status, tracking.is_tracked(), off), (TrackingStatus::Degenerate, false, None));
+        if let Some((metres, radians)) = off {
+            assert!(
+                k > 0 && tracking.is_tracked() && metres < 5e-3 && radians < 2e-3,
+                "{k}: {metres} m, {radians} rad"
+            );
+            continue;
+        }
+        assert_eq!((tracking.status, tracking.is_tracked()), (TrackingStatus::Degenerate, false));
         let left_out = |event: &Event| matches!(event, Event::LeftOut { why: LeftOut::Degenerate { .. }, .. });
         assert!(outcome.events.iter().any(left_out), "{outcome:?}");
     }

@@ -34,7 +34,8 @@ fn a_grid_of_gaps_costs_nothing() {
         assert!(all as f64 > 0.97 * whole.fused_pixels as f64, "{all} of {}", whole.fused_pixels);
     }
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-    assert!(errors.len() as f64 > 0.99 * whole_errors.len() as f64, "{} of {}", errors.len(), whole_errors.len());
+    // A rim in a gap is known a pixel later.
+    assert!(errors.len() as f64 > 0.985 * whole_errors.len() as f64, "{} of {}", errors.len(), whole_errors.len());
     assert!(mean < 0.3e-3, "mean {mean}");
 }
 
