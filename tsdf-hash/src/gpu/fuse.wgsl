@@ -46,6 +46,9 @@ const BLOCK_WORDS: u32 = 1792u;
 const WEIGHTS: u32 = 512u;
 const COLOURS: u32 = 768u;
 const ONE: i32 = 32767;
+// Where weights start to fall behind a surface, and by how much a step (7 / 65536): as in integrator.rs.
+const FULL: f32 = 4096.0;
+const FADING: f32 = 0.0001068115234375;
 const MAX_COLOURS: u32 = 1040u;
 // Of a rim: how many pixels it is away, in place of the last bits of its depth.
 const RIM_PIXELS: u32 = 255u;
@@ -100,10 +103,13 @@ fn colour_at(u: f32, v: f32, depth_pixel: u32) -> vec4<u32> {
     return vec4(channel(3u * pixel), channel(3u * pixel + 1u), channel(3u * pixel + 2u), 1u);
 }
 
-fn observe(old: Voxel, distance: f32, weight: u32) -> Voxel {
+fn observe(old: Voxel, distance: f32, seen: u32) -> Voxel {
     var voxel = old;
-    let q = i32(nearest(clamp(distance, f32(-ONE), f32(ONE))));
-    let change = q * i32(weight);
+    let steps = nearest(clamp(distance, f32(-ONE), f32(ONE)));
+    // Exact until it is rounded.
+    let left = plus(f32(seen), times(times(f32(seen), min(plus(steps, FULL), 0.0)), FADING));
+    let weight = u32(nearest(max(left, 1.0)));
+    let change = i32(steps) * i32(weight);
     if frame.mode == DEINTEGRATE {
         voxel.distance -= change;
         voxel.weight = (voxel.weight - weight) & 0xffffu;

@@ -11,7 +11,7 @@ use crate::integration::colour::{ColourSource, accumulate_colour};
 use crate::integration::plane_image::PlaneImage;
 use crate::integration::rims::{self, Rim};
 use crate::integration::voxel_lanes::{HALVES, LANES, ProjectedVoxels, RowOffsets, mask};
-use crate::rounding::{ROUNDER, max, rounded};
+use crate::rounding::{ROUNDER, max, min, rounded};
 use crate::settings::Settings;
 
 /// Colours are taken this close to the surface, in voxels (ours).
@@ -150,8 +150,11 @@ impl<'a> Frame<'a> {
     ///                if beside, q = min(q, max((rim.pixels - 1/2) pixel rim.depth - h/2, rim.depth - p.z, 0) per_metre)
     ///                q = round(min(max(q, -32767), 32767))
     ///                w = the last four bits of slope_v
+    ///                w = round(max(w + w min(q + full, 0) fading, 1))
     ///                S += w q;  W += w                               in integers
     /// ```
+    ///
+    /// What is behind a surface may be in front of another that this frame does not see: it weighs less the deeper it is.
     ///
     /// `front` is `μ`, or the distance that is carved if that is larger. `start` and the steps are computed in double precision and rounded once.
     fn update<const INTEGRATE: bool>(&self, key: BlockKey, block: &mut VoxelBlock) -> UpdateCount {
@@ -288,9 +291,12 @@ impl<'a> Frame<'a> {
             let q = if RIMS && beside[x] < q { beside[x] } else { q };
             let q = if q > -LIMIT { q } else { -LIMIT };
             let q = if q < LIMIT { q } else { LIMIT };
-            let weight = slope_v[x].to_bits().cast_signed() & 15 & touched[x];
-            // An integer below 2^19, so the product is exact.
-            let product = rounded(((q + ROUNDER) - ROUNDER) * weight as f32) & touched[x];
+            let q = (q + ROUNDER) - ROUNDER;
+            // Integers below 2^22 and a power of two: all of it is exact until it is rounded.
+            let seen = (slope_v[x].to_bits().cast_signed() & 15) as f32;
+            let left = seen + seen * min(q + FULL, 0.0) * FADING;
+            let weight = rounded(max(left, 1.0)) & touched[x];
+            let product = rounded(q * weight as f32) & touched[x];
             let (sum, total) = if INTEGRATE {
                 (sums[x].wrapping_add(product), i32::from(totals[x]) + weight)
             } else {
@@ -318,6 +324,12 @@ impl<'a> Frame<'a> {
     }
 }
 
+/// Weights start to fall so many steps of the stored distance behind a surface (ours: `μ / 8`, half a voxel of four to `μ`): a weight that
+/// goes with the noise of its own distance would shift the mean.
+const FULL: f32 = 4096.0;
+/// By so much a step from there on (ours: they are at the least by `0.4 μ`). What is in front of a thing on one side is behind it from the
+/// other: with equal weights, one that is thinner than `μ` would vanish between its two sides.
+const FADING: f32 = 7.0 / 65536.0;
 /// Largest stored distance of one observation.
 const LIMIT: f32 = ONE as f32;
 

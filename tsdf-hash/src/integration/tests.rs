@@ -67,7 +67,11 @@ fn slow(frame: &Frame, plane_image: &PlaneImage, colour: &ColourView, key: Block
         let coloured = within && q.abs() < frame.colour_reach;
         let aside = (rim.pixels() as f32 - 0.5) * frame.pixel * rim.depth();
         let q = if beside { q.min((aside - frame.half_voxel).max(ahead).max(0.0) * frame.per_metre) } else { q };
-        block.distance[voxel] += round(q.clamp(-32767.0, 32767.0)) as i32 * w as i32;
+        let q = round(q.clamp(-32767.0, 32767.0)) as i32;
+        // From 4096 steps behind on, less by a share of seven 65536ths for each, rounded to even at a tie.
+        let left = f64::from(w) * (1.0 + f64::from((q + 4096).min(0)) * 7.0 / 65536.0);
+        let w = left.max(1.0).round_ties_even() as i32;
+        block.distance[voxel] += q * w;
         block.weight[voxel] += w as u16;
         // The colour image may have another size; its camera stands in the same place.
         let k = &colour.intrinsics;
