@@ -16,6 +16,13 @@ use crate::inertial::preintegration::ImuPreintegration;
 const OUTLIER_RATIO: f64 = 2.5;
 /// The window is solved again if the gyroscope's bias is found so far from that of the preintegrations, rad/s.
 const MAX_BIAS_CHANGE: f64 = 3e-3;
+/// Who hardly moves may start with the scale known to this only: the distances are then known about as well as
+/// [`LandmarkSettings`](crate::filter::LandmarkSettings) has them of a body at rest.
+const SLOW_SCALE_SIGMA: f64 = 0.5;
+/// As fast as that at most, m/s, two standard deviations included.
+const SLOW: f64 = 0.05;
+/// And so slow that points turn by no more than this, rad/s, in the median: whatever the scale, and if that is badly mistaken, too.
+const SLOW_PARALLAX: f64 = 0.01;
 /// Least number of points.
 pub(crate) const MIN_POINTS: usize = 10;
 
@@ -90,10 +97,20 @@ fn validate(
         return DynamicOutcome::Inconsistent;
     }
     let motion = at_last_image(window, kept, found);
-    if motion.scale_sigma > settings.max_scale_sigma || motion.landmarks.len() < MIN_POINTS / 2 {
+    let slow = motion.scale_sigma < SLOW_SCALE_SIGMA && is_slow(&motion);
+    let known = slow || motion.scale_sigma <= settings.max_scale_sigma;
+    if !known || motion.landmarks.len() < MIN_POINTS / 2 {
         return DynamicOutcome::Unobservable;
     }
     DynamicOutcome::Converged(Box::new(motion))
+}
+
+fn is_slow(motion: &InitialMotion) -> bool {
+    let core = motion.core * motion.covariance * motion.core.transpose();
+    let sigma = core.fixed_view::<3, 3>(error_state::VELOCITY, error_state::VELOCITY).trace().sqrt();
+    let speed = motion.velocity.norm();
+    let nearness = median(motion.landmarks.iter().map(|landmark| landmark.inverse_distance).collect());
+    speed + 2.0 * sigma < SLOW && speed * nearness < SLOW_PARALLAX
 }
 
 /// The solution moved to the last image.
