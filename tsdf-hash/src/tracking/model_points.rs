@@ -18,7 +18,7 @@ pub(crate) struct ModelPoint {
 
 /// Points along each side of a tile.
 const TILE: usize = 8;
-/// What is so many voxels behind a point a voxel beside it is another surface: a plane seen at 76 degrees (ours).
+/// What is so many times as far behind a point as it is beside it is another surface: a plane seen at 76 degrees (ours).
 const RIM_DEPTH: f64 = 4.0;
 
 /// The points of a view, tile by tile: what is wrong with the map is alike within a tile.
@@ -39,9 +39,9 @@ impl Model {
 /// The points of every `stride`-th pixel of a view along each side; intensities are means over `2 radius + 1` pixels along each
 /// side.
 ///
-/// Points at rims are left out: where a surface ends is known to a voxel, and differently from each side, so that a rim would hold
-/// a pose where it was rounded off, along directions that nothing else fixes.
-pub(crate) fn model_points(view: &View, voxel_size: f64, stride: usize, radius: usize, out: &mut Model) {
+/// Points nearer than `rim_width` to a rim are left out, metres; 0: none. Where a surface ends is known to a voxel, and differently from each
+/// side: what is seen again from elsewhere would be held where its rims were rounded off, along directions that nothing else fixes.
+pub(crate) fn model_points(view: &View, rim_width: f64, stride: usize, radius: usize, out: &mut Model) {
     out.points.clear();
     out.ends.clear();
     let Some(k) = view.intrinsics else { return };
@@ -53,7 +53,7 @@ pub(crate) fn model_points(view: &View, voxel_size: f64, stride: usize, radius: 
                 for u in (column + stride / 2..view.width.min(column + side)).step_by(stride) {
                     let at = v * view.width + u;
                     let z = f64::from(view.depth[at]);
-                    if z > 0.0 && !is_at_rim(view, [u, v], &k, voxel_size) {
+                    if z > 0.0 && !is_at_rim(view, [u, v], &k, rim_width) {
                         let ray = Vector3::new((u as f64 - k.cx) / k.fx, (v as f64 - k.cy) / k.fy, 1.0);
                         let position = (rotation * ray * z).cast::<f32>().into();
                         let intensity = intensity(view, u, v, radius);
@@ -68,12 +68,12 @@ pub(crate) fn model_points(view: &View, voxel_size: f64, stride: usize, radius: 
     }
 }
 
-/// Whether a voxel beside a point there is a surface far behind it.
-fn is_at_rim(view: &View, [u, v]: [usize; 2], k: &Intrinsics, voxel_size: f64) -> bool {
+/// Whether so many metres beside a point there is a surface far behind it.
+fn is_at_rim(view: &View, [u, v]: [usize; 2], k: &Intrinsics, width: f64) -> bool {
     let at = v * view.width + u;
     let z = f64::from(view.depth[at]);
-    let behind = (z + RIM_DEPTH * voxel_size) as f32;
-    let [across, down] = [k.fx, k.fy].map(|f| (voxel_size * f.abs() / z).ceil() as usize);
+    let behind = (z + RIM_DEPTH * width) as f32;
+    let [across, down] = [k.fx, k.fy].map(|f| (width * f.abs() / z).ceil() as usize);
     let is_behind = |is_there: bool, at: usize| is_there && view.depth[at] > behind;
     is_behind(u >= across, at.wrapping_sub(across))
         || is_behind(u + across < view.width, at + across)

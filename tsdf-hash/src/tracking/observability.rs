@@ -103,7 +103,7 @@ impl Observation<'_> {
     /// Takes all points of the view, once.
     fn fill(&self, all: &mut Model) {
         if all.points.is_empty() {
-            model_points(self.view, self.comparison.voxel_size(), 1, 0, all);
+            model_points(self.view, self.comparison.rim_width, 1, 0, all);
         }
     }
 }

@@ -108,7 +108,7 @@ impl Relocaliser {
     /// # Errors
     /// [`Error::InvalidSetting`].
     pub fn new(settings: TrackingSettings) -> Result<Self, Error> {
-        let tracker = Tracker::new(settings)?;
+        let tracker = Tracker::of_revisits(settings)?;
         Ok(Self { tracker, surface: None, up_in_camera: None, reserve: None, places: Vec::new() })
     }
 

@@ -45,6 +45,8 @@ pub(crate) struct Comparison<'a> {
     pub(crate) max_distance: f32,
     /// Half a voxel: the map is not better than that, metres.
     pub(crate) tolerance: f32,
+    /// As that of [`model_points`](crate::tracking::model_points::model_points).
+    pub(crate) rim_width: f64,
     pub(crate) photometric: bool,
     pub(crate) threads: usize,
 }

@@ -84,8 +84,10 @@ pub struct Tracker {
     /// Fine to coarse.
     levels: [ImageLevel; LEVELS],
     models: [Model; LEVELS],
-    /// Settles from afar: whoever does will try again from elsewhere, and needs no search for what outlines say.
+    /// Settles from afar against what may have been seen from elsewhere: whoever does will try again, and needs no search for what outlines say.
     settles: bool,
+    /// Everything that is tracked against may have been seen from elsewhere.
+    revisits: bool,
 }
 
 impl Tracker {
@@ -95,7 +97,12 @@ impl Tracker {
     /// [`Error::InvalidSetting`].
     pub fn new(settings: TrackingSettings) -> Result<Self, Error> {
         settings.check()?;
-        Ok(Self { settings, levels: Default::default(), models: Default::default(), settles: false })
+        Ok(Self { settings, levels: Default::default(), models: Default::default(), settles: false, revisits: false })
+    }
+
+    /// One that looks for a lost camera.
+    pub(crate) fn of_revisits(settings: TrackingSettings) -> Result<Self, Error> {
+        Ok(Self { revisits: true, ..Self::new(settings)? })
     }
 
     /// The settings given to [`new`](Self::new).
@@ -282,21 +289,27 @@ impl Tracker {
             noise: self.settings.noise,
             max_distance: reach as f32,
             tolerance: (0.5 * voxel_size) as f32,
+            rim_width: self.rim_width(voxel_size),
             photometric: self.settings.photometric && !self.levels[level].intensity.is_empty(),
             threads: self.settings.threads,
         }
     }
 
     fn read(&mut self, view: &View, voxel_size: f64, depth: &DepthView, colour: Option<&ColourView>) {
-        let range = [1e-3, 1e3];
+        let (range, rim_width) = ([1e-3, 1e3], self.rim_width(voxel_size));
         let [fine, middle, coarse] = &mut self.levels;
         fine.read(depth, colour, self.settings.reduction(depth.width), range);
         fine.halve(middle);
         middle.halve(coarse);
         // The finest level takes every other point: neighbours say nearly the same.
         for (model, (stride, radius)) in self.models.iter_mut().zip([(FINE_STRIDE, 0), (2, 1), (4, 2)]) {
-            model_points(view, voxel_size, stride, radius, model);
+            model_points(view, rim_width, stride, radius, model);
         }
+    }
+
+    /// What was seen long ago was seen from elsewhere; from frame to frame, rims tell one step of stairs from the next.
+    fn rim_width(&self, voxel_size: f64) -> f64 {
+        if self.settles || self.revisits { voxel_size } else { 0.0 }
     }
 
     fn outcome(

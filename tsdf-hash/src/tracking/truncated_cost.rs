@@ -149,6 +149,7 @@ mod tests {
             noise,
             max_distance,
             tolerance,
+            rim_width: 0.0,
             photometric: false,
             threads: 1,
         };

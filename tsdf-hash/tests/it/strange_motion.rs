@@ -53,6 +53,13 @@ fn a_fast_camera_is_placed_right_or_not_at_all() {
     }
 }
 
+/// With noise, the rims of the steps tell one step from the next.
+#[test]
+fn a_step_is_not_taken_for_the_next() {
+    let ([right, wrong, left_out], worst) = run(World::Stairs, motion(9), 9, true);
+    assert!(wrong == 0 && right == FRAMES, "{right}, {wrong}, {left_out}; {worst} m");
+}
+
 #[test]
 #[ignore = "figures of the book, half a minute"]
 fn fast_cameras() {
