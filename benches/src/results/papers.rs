@@ -33,7 +33,7 @@ const PAPERS: &[(&str, Parts)] = &[
             ["Fig. 5.5", "[drift before and after](results.md#loops-and-relocalisation)"],
             ["Table 5.1", "[rendered sequences like these](results.md#tracking); its own are not published"],
             ["Fig. 5.7; Fig. 5.8", "[active memory and times of ours](results.md#tsdf-hash); not its GPU"],
-            ["Fig. 5.9; Table 5.2", "[one of these so far and other recordings](results.md#tracking)"],
+            ["Fig. 5.9; Table 5.2", "[of `fast` and of other recordings](results.md#tracking)"],
             ["Fig. 5.10", "[mesh against the true surface](results.md#tsdf-hash)"],
         ],
     ),

@@ -18,7 +18,7 @@ pub(crate) struct ModelPoint {
 
 /// Points along each side of a tile.
 const TILE: usize = 8;
-/// What is so many times as far behind a point as it is beside it is another surface: a plane seen at 76 degrees (ours).
+/// What lies so many times farther behind a point than beside it is another surface (ours): more than a plane seen at 76 degrees.
 const RIM_DEPTH: f64 = 4.0;
 
 /// The points of a view, tile by tile: what is wrong with the map is alike within a tile.
