@@ -16,6 +16,22 @@ pub const SEQUENCES: [&str; 6] = ["MH_01", "MH_03", "MH_04", "V1_02", "paint_1",
 /// Recorded flights together with the readings of the inertial sensor that was on board.
 pub const REAL_IMU: [&str; 3] = ["V1_01_imu", "V1_02_imu", "MH_04_imu"];
 
+/// Recorded flights and walks that are slower, faster or turn more than [`SEQUENCES`]: of the TUM VI, UZH-FPV (drone races), KAIST VIO and TUM
+/// RGB-D data sets.
+pub const OTHER_FLIGHTS: [&str; 11] = [
+    "room1",
+    "room4",
+    "indoor_3",
+    "indoor_5",
+    "outdoor_5",
+    "circle",
+    "infinite",
+    "rotation",
+    "square",
+    "fr1_xyz",
+    "fr2_desk",
+];
+
 /// Left and right camera of a sequence.
 pub fn cameras(name: &str) -> [Camera; 2] {
     if name.starts_with("paint") {
@@ -40,10 +56,21 @@ pub fn motion(data: &Path, name: &str, seconds: Option<f64>) -> Result<Spline, B
         "MH_04_imu" => ("vio/euroc_imu_gt/MH_04_difficult/groundtruth_MH_04_difficult.csv.gz", 5_000_000),
         "V1_02_imu" => ("vio/euroc_imu_gt/V1_02_medium/groundtruth_V1_02_medium.csv.gz", 5_000_000),
         "V1_01_imu" => ("vio/euroc_V1_01_micro/mav0/state_groundtruth_estimate0/V1_01_easy.txt.gz", 50_000_000),
+        "room1" => ("trajectories/tum_vi/dataset-room1_512_16.txt.gz", 50_000_000),
+        "room4" => ("trajectories/tum_vi/dataset-room4_512_16.txt.gz", 50_000_000),
+        "indoor_3" => ("trajectories/uzhfpv/indoor_forward_3_snapdragon_with_gt.txt.gz", 50_000_000),
+        "indoor_5" => ("trajectories/uzhfpv/indoor_forward_5_snapdragon_with_gt.txt.gz", 50_000_000),
+        "outdoor_5" => ("trajectories/uzhfpv/outdoor_forward_5_snapdragon_with_gt.txt.gz", 50_000_000),
+        "circle" => ("trajectories/kaist_vio/circle_fast.txt.gz", 50_000_000),
+        "infinite" => ("trajectories/kaist_vio/infinite_fast.txt.gz", 50_000_000),
+        "rotation" => ("trajectories/kaist_vio/rotation.txt.gz", 50_000_000),
+        "square" => ("trajectories/kaist_vio/square_head.txt.gz", 50_000_000),
+        "fr1_xyz" => ("trajectories/evo/freiburg1_xyz-groundtruth.txt.gz", 50_000_000),
+        "fr2_desk" => ("trajectories/evo/fr2_desk_groundtruth.txt.gz", 50_000_000),
         "paint_1" => return Ok(painting_flight(1, seconds.unwrap_or(60.0))?),
         "paint_2" => return Ok(painting_flight(2, seconds.unwrap_or(60.0))?),
         _ => {
-            let names = [&SEQUENCES[..], &REAL_IMU[..]].concat().join(", ");
+            let names = [&SEQUENCES[..], &OTHER_FLIGHTS[..], &REAL_IMU[..]].concat().join(", ");
             return Err(format!("`{name}` is no sequence: they are {names}").into());
         }
     };
@@ -54,13 +81,25 @@ pub fn motion(data: &Path, name: &str, seconds: Option<f64>) -> Result<Spline, B
         false => tum::read(&text)?,
     };
     let mut cut = Trajectory::default();
-    let first = whole.stamps().first().copied().unwrap_or_default();
-    for (stamp, pose) in whole.iter().take_while(|(s, _)| seconds.is_none_or(|most| s.secs_since(first) <= most)) {
+    let first = whole.stamps().first().copied().unwrap_or_default().plus_secs(on_ground(name));
+    let flown = whole.iter().filter(|(stamp, _)| *stamp >= first);
+    for (stamp, pose) in flown.take_while(|(s, _)| seconds.is_none_or(|most| s.secs_since(first) <= most)) {
         cut.push(stamp, *pose)?;
     }
     // Poses as far apart as the knots must be met, not approached.
     let spline = if name == "V1_01_imu" { Spline::through_trajectory } else { Spline::from_trajectory };
     Ok(spline(&cut, knots)?)
+}
+
+/// Seconds that a recording of KAIST VIO stands on the ground; there its truth turns by half a turn now and then, which nothing does.
+fn on_ground(name: &str) -> f64 {
+    match name {
+        "circle" => 64.0,
+        "infinite" => 60.0,
+        "rotation" => 76.0,
+        "square" => 12.0,
+        _ => 0.0,
+    }
 }
 
 /// What the inertial sensor on board read along the motion of one of [`REAL_IMU`].

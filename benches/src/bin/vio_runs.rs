@@ -14,6 +14,7 @@ use paintcopter_benches::frames::Frames;
 use paintcopter_benches::sequences::{REAL_IMU, SEQUENCES, cameras, motion, real_samples};
 use serde_json::json;
 use vio_ekf::eval::{Alignment, Association, ate, chi2, heading_onto};
+use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::format::tum;
 use vio_ekf::inertial::{InitialSigma, InitialState};
 use vio_ekf::lie::so3;
@@ -27,9 +28,13 @@ type AnyError = Box<dyn Error>;
 #[command(after_help = "Example: vio_runs --sequence MH_03 --seeds 5")]
 struct Arguments {
     /// `MH_01`, `MH_03`, `MH_04`, `V1_02`, `paint_1`, `paint_2`; all of them if none is named. Several may be given. `V1_01_imu`,
-    /// `V1_02_imu` and `MH_04_imu` are flown with the recorded readings of the inertial sensor, from a start of the filter's own
+    /// `V1_02_imu` and `MH_04_imu` are flown with the recorded readings of the inertial sensor, from a start of the filter's own;
+    /// a name that is none lists the others
     #[arg(long)]
     sequence: Vec<String>,
+    /// Lets the filter start by itself, as on a recording, instead of near the truth
+    #[arg(long)]
+    own_start: bool,
     /// Runs of each sequence, with seeds 1, 2, ...: another room, other noise
     #[arg(long, default_value_t = 1)]
     seeds: u64,
@@ -79,8 +84,10 @@ const NEES: [&str; 5] = ["position", "attitude", "velocity", "gyro_bias", "accel
 struct Outcome {
     se3: f64,
     yaw: f64,
-    /// After each image.
+    /// After each image with a pose.
     nees: Vec<[f64; 5]>,
+    /// Seconds from the beginning until the first pose.
+    first_pose_s: f64,
     millis: Vec<f64>,
     /// Time of an inertial sample together with an output with covariance.
     imu_micros: Vec<f64>,
@@ -118,7 +125,8 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
             diverged += usize::from(outcome.diverged);
             let mut line = json!({
                 "sequence": name, "seed": seed, "ate_se3_m": outcome.se3, "ate_yaw_m": outcome.yaw,
-                "frames": outcome.millis.len(), "frame_ms_median": quantile(&outcome.millis, 0.5),
+                "frames": outcome.millis.len(), "poses": outcome.nees.len() as f64 / outcome.millis.len() as f64,
+                "first_pose_s": outcome.first_pose_s, "frame_ms_median": quantile(&outcome.millis, 0.5),
                 "frame_ms_p99": quantile(&outcome.millis, 0.99), "diverged": outcome.diverged,
             });
             for (k, what) in NEES.iter().enumerate() {
@@ -167,18 +175,22 @@ fn follow(
 ) -> Result<Outcome, AnyError> {
     let imu = ImuModel::default();
     let real = REAL_IMU.contains(&name);
+    let own_start = real || arguments.own_start;
     let recording = simulation.imu(0)?;
     let read = if real { real_samples(&arguments.data, name, simulation.spline())? } else { recording.samples.clone() };
     let [left, right] = cameras(name);
-    let mut vio = if arguments.stereo {
-        Vio::stereo(left, right, imu.noise, *settings)?
-    } else {
-        Vio::new(left, imu.noise, *settings)?
+    let calibrations =
+        [left, right].map(|camera| CameraCalibration { camera, rate_hz: None, time_offset_s: 0.0, row_time_s: 0.0 });
+    let sensor = ImuCalibration { noise: imu.noise, rate_hz: 200.0, body_from_imu: Isometry3::identity() };
+    let mut vio = match (own_start, arguments.stereo) {
+        (true, stereo) => Vio::from_calibration(&calibrations[..if stereo { 2 } else { 1 }], &sensor, *settings)?,
+        (false, true) => Vio::stereo(left, right, imu.noise, *settings)?,
+        (false, false) => Vio::new(left, imu.noise, *settings)?,
     };
     let mut samples = read.iter();
     let first = samples.next().ok_or("the sequence is too short")?;
     vio.imu(first)?;
-    if !real {
+    if !own_start {
         vio.initialize(&start(simulation, first.stamp, &imu, seed)?)?;
     }
 
@@ -186,8 +198,15 @@ fn follow(
     let first = Frames::new(simulation, 0, left, folder(""))?;
     let second = arguments.stereo.then(|| Frames::new(simulation, 1, right, folder("_right"))).transpose()?;
     let (mut truth, mut estimate) = (Trajectory::default(), Trajectory::default());
-    let mut outcome =
-        Outcome { se3: 0.0, yaw: 0.0, nees: Vec::new(), millis: Vec::new(), imu_micros: Vec::new(), diverged: false };
+    let mut outcome = Outcome {
+        se3: f64::NAN,
+        yaw: f64::NAN,
+        nees: Vec::new(),
+        first_pose_s: f64::NAN,
+        millis: Vec::new(),
+        imu_micros: Vec::new(),
+        diverged: false,
+    };
     let (mut next, mut moved) = (samples.next(), None);
     for index in 0..first.count() {
         let Some(frame) = first.get(index)? else { continue };
@@ -209,20 +228,29 @@ fn follow(
         };
         outcome.millis.push(began.elapsed().as_secs_f64() * 1e3);
         outcome.diverged |= matches!(report.status, Status::Diverged(_));
+        if outcome.diverged && own_start {
+            continue;
+        }
         if std::env::var_os("VIO_TRACE").is_some() {
             eprintln!("{} {report:?}", frame.stamp);
         }
         let Some(odometry) = vio.output() else {
-            if !real || moved.is_some() {
+            if !own_start {
                 return Err("the filter is not running".into());
             }
+            // A start that is taken back takes its world along.
+            (truth, estimate, moved) = (Trajectory::default(), Trajectory::default(), None);
+            outcome.nees.clear();
             continue;
         };
         if odometry.stamp > simulation.spline().span().1 {
             break;
         }
         let mut motion = simulation.motion(odometry.stamp)?;
-        if real {
+        if outcome.nees.is_empty() {
+            outcome.first_pose_s = frame.stamp.secs_since(simulation.spline().span().0);
+        }
+        if own_start {
             // Its world begins where it does.
             let moved = *moved.get_or_insert_with(|| heading_onto(&odometry.world_from_body, &motion.world_from_body));
             motion.world_from_body = moved * motion.world_from_body;
@@ -237,6 +265,9 @@ fn follow(
             squares[3..].fill(f64::NAN);
         }
         outcome.nees.push(squares);
+    }
+    if outcome.nees.is_empty() {
+        return Ok(outcome);
     }
     let pairs = Association::default().pair_up(&truth, &estimate)?;
     outcome.se3 = ate(&pairs.reference, &pairs.estimate, Alignment::Se3)?.position.rmse;

@@ -18,6 +18,9 @@ const GYROSCOPE_RATE: f64 = 200.0;
 const GYROSCOPE_NOISE: f64 = 2.4e-3;
 const GYROSCOPE_BIAS: [f64; 3] = [0.01, -0.008, 0.005];
 
+/// Images from one line of progress to the next.
+const PROGRESS_EVERY: usize = 100;
+
 type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Is shown every image before the SLAM is: its number, its time, s, and the pose of the camera.
@@ -61,6 +64,8 @@ pub struct Figures {
     pub mesh_mean_m: f64,
     /// The deviation.
     pub mesh_deviation_m: f64,
+    /// The median.
+    pub mesh_median_m: f64,
     /// Vertices of the mesh.
     pub vertices: usize,
     /// Most bytes of active memory.
@@ -100,16 +105,23 @@ pub fn run(sequence: &Sequence, limits: &Limits, see: See) -> Result<Figures, An
         let outcome = slam.frame(time, &shot.depth(), Some(&shot.colour()), (frame == 0).then_some(&pose))?;
         tracking.extend(outcome.tracking_seconds);
         for event in &outcome.events {
-            if let Event::Placed(placed) = event {
-                fusion.extend(placed.fusion_seconds);
+            match event {
+                Event::Placed(placed) => fusion.extend(placed.fusion_seconds),
+                Event::Lost | Event::Found | Event::Relocalised { .. } | Event::Degenerate { .. } => {
+                    eprintln!("{} {frame}: {event:?}", sequence.name);
+                }
+                _ => {}
             }
+        }
+        if (frame + 1).is_multiple_of(PROGRESS_EVERY) {
+            eprintln!("{}: {} of {frames} images, {} loops", sequence.name, frame + 1, slam.statistics().loops);
         }
     }
     let statistics = *slam.statistics();
     // A loop at the end is still to reach the map.
     while slam.reintegrate(usize::MAX)? > 0 {}
     let (truth, found): (Vec<_>, Vec<_>) = slam.frames().map(|(frame, pose)| (rendered.pose(frame), pose)).unzip();
-    let off: Vec<f64> = slam
+    let mut off: Vec<f64> = slam
         .finish()?
         .map
         .consolidated()?
@@ -118,6 +130,7 @@ pub fn run(sequence: &Sequence, limits: &Limits, see: See) -> Result<Figures, An
         .iter()
         .map(|vertex| rendered.world.distance(&Point3::from(vertex.map(f64::from))).abs())
         .collect();
+    off.sort_unstable_by(f64::total_cmp);
     let mean = off.iter().sum::<f64>() / off.len().max(1) as f64;
     let variance = off.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / off.len().max(1) as f64;
     let steps = 1..frames;
@@ -133,6 +146,7 @@ pub fn run(sequence: &Sequence, limits: &Limits, see: See) -> Result<Figures, An
         ate_se3_m: ate(&truth, &found, Alignment::Se3)?.position.rmse,
         mesh_mean_m: mean,
         mesh_deviation_m: variance.sqrt(),
+        mesh_median_m: off.get(off.len() / 2).copied().unwrap_or_default(),
         vertices: off.len(),
         active_bytes: statistics.active_bytes_peak,
         evicted_bytes: statistics.host_bytes_peak,

@@ -4,6 +4,7 @@ use crate::support::flight::{GRAVITY, camera};
 use crate::support::rng::Rng;
 use nalgebra::{UnitQuaternion, Vector3};
 use vio_ekf::filter::InitializationStatus;
+use vio_ekf::inertial::{InitialSigma, InitialState};
 use vio_ekf::lie::so3;
 use vio_ekf::{Camera, ImageView, Imu, ImuNoise, Settings, Stamp, Status, Vio, nalgebra};
 
@@ -239,4 +240,33 @@ fn deviation_at_rest(drift: f64) -> f64 {
 fn templates_that_drift_widen_the_covariance() {
     let [none, usual, much] = [0.0, 0.15, 1.0].map(deviation_at_rest);
     assert!(none > 0.0 && usual > 1.003 * none && much > 1.1 * usual, "{none} m, {usual} m, {much} m");
+}
+
+/// Corners that are not found again contradict a motion that says where they are. A fast one does not: how far new ones move in the image
+/// depends on their distance, which nobody knows.
+#[test]
+fn what_may_be_anywhere_contradicts_nothing() {
+    for (speed, contradict) in [(0.1, true), (12.0, false)] {
+        let mut rng = Rng::new(8);
+        let mut vio = Vio::new(small_camera(), ImuNoise::default(), Settings::default()).unwrap();
+        let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+        let sample = |millis| Imu { stamp: at(millis), gyro: Vector3::zeros(), accel: Vector3::z() * GRAVITY };
+        vio.imu(&sample(0)).unwrap();
+        let world_from_body = nalgebra::Isometry3::identity();
+        let velocity_in_body = Vector3::y() * speed;
+        let (gyro_bias, accel_bias, sigma) = (Vector3::zeros(), Vector3::zeros(), InitialSigma::default());
+        let start = InitialState { stamp: at(0), world_from_body, velocity_in_body, gyro_bias, accel_bias, sigma };
+        vio.initialize(&start).unwrap();
+        let mut reports = Vec::new();
+        for millis in (5..=200).step_by(5) {
+            vio.imu(&sample(millis)).unwrap();
+            if millis % 100 == 0 {
+                let picture = seen(&boxes(millis as u64), 1.0, 0, &mut rng);
+                reports.push(vio.image(at(millis), &ImageView::new(WIDTH, HEIGHT, &picture).unwrap()).unwrap());
+            }
+        }
+        assert!(reports[0].added > 15, "{:?}", reports[0]);
+        assert_eq!(reports[1].rejected > 10, contradict, "at {speed} m/s: {:?}", reports[1]);
+        assert_eq!(reports[1].consecutive_outliers > 0, contradict, "at {speed} m/s: {:?}", reports[1]);
+    }
 }

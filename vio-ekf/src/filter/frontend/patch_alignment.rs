@@ -33,7 +33,8 @@ pub(crate) enum PatchAlignment<const C: usize> {
     OutOfView,
     /// Nothing there fits.
     Failed,
-    /// The patch is where it is expected, and looks too different to tell where exactly: blurred, or seen from elsewhere.
+    /// Nothing that contradicts the motion: the patch is where it is expected, and looks too different to tell where exactly (blurred, or
+    /// seen from elsewhere), or it may be farther from there than is looked.
     Changed,
     /// The measurement at the solution, and how the patch's surface is turned.
     Converged(LinearizedMeasurement<2, C>, Option<SlantEvidence>),
@@ -72,7 +73,8 @@ pub(crate) fn align_patch<const C: usize>(
     if !Patch::is_inside(pyramid, &pixel, &(by_bearing * landmark.warp)) {
         return PatchAlignment::OutOfView;
     }
-    let first = initial_guess(estimator, &measurement, (&pixel, &by_bearing));
+    let (first, in_reach) = initial_guess(estimator, &measurement, (&pixel, &by_bearing));
+    let failed = if in_reach { PatchAlignment::Failed } else { PatchAlignment::Changed };
     measurement.last_step.set(first);
     let iteration = Iteration { limit: COARSE_ITERATIONS, tolerance: 1e-2 };
     // Its outcome does not matter, only where it ended: the gates judge the alignment on all levels.
@@ -83,11 +85,11 @@ pub(crate) fn align_patch<const C: usize>(
     let iteration = Iteration { limit: settings.update.max_iterations, tolerance: 1e-3 };
     let linearized = linearize_iterated(estimator, &measurement, iteration, measurement.last_step.get());
     let (Some(linearized), Some(comparison)) = (linearized, measurement.last_comparison.get()) else {
-        return PatchAlignment::Failed;
+        return failed;
     };
     let ratio = comparison.residual / comparison.energy;
     if ratio > ELSEWHERE || !passes_gate(estimator, &linearized, settings.update.max_mahalanobis) {
-        PatchAlignment::Failed
+        failed
     } else if ratio > settings.patches.max_residual_ratio {
         PatchAlignment::Changed
     } else {
@@ -100,22 +102,23 @@ pub(crate) fn align_patch<const C: usize>(
 }
 
 /// The best of some guesses along the longer axis of the predicted uncertainty, over two deviations: photometric alignment
-/// converges from a pixel or two only, and the prediction may be off by more.
+/// converges from a pixel or two only, and the prediction may be off by more. Also returns whether the guesses reach that far.
 fn initial_guess<const C: usize>(
     estimator: &Estimator,
     measurement: &PatchMeasurement<C>,
     (pixel, by_bearing): (&Vector2<f64>, &Matrix2<f64>),
-) -> SVector<f64, C> {
+) -> (SVector<f64, C>, bool) {
     let eigen = predicted(estimator, measurement, (pixel, by_bearing)).symmetric_eigen();
     let longest = eigen.eigenvalues.imax();
     let deviation = eigen.eigenvalues[longest].max(0.0).sqrt();
     let spacing = GUESS_SPACING / measurement.pyramid.patch_levels()[LEVELS - 1].scale;
-    let count = ((2.0 * deviation / spacing).floor() as i32).min(MAX_GUESSES);
-    let Some(tangent_from_pixel) = by_bearing.try_inverse() else { return SVector::zeros() };
+    let wanted = (2.0 * deviation / spacing).floor() as i32;
+    let (count, in_reach) = (wanted.min(MAX_GUESSES), wanted <= MAX_GUESSES);
+    let Some(tangent_from_pixel) = by_bearing.try_inverse() else { return (SVector::zeros(), in_reach) };
     let step: Vector2<f64> = tangent_from_pixel * eigen.eigenvectors.column(longest) * spacing;
     let mut best = (f64::INFINITY, SVector::zeros());
     if count == 0 {
-        return best.1;
+        return (best.1, in_reach);
     }
     for k in -count..=count {
         let mut delta = SVector::<f64, C>::zeros();
@@ -126,7 +129,7 @@ fn initial_guess<const C: usize>(
             best = (comparison.ssd, delta);
         }
     }
-    best.1
+    (best.1, in_reach)
 }
 
 /// Covariance of the pixel in which a landmark is expected.
