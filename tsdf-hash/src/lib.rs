@@ -108,6 +108,7 @@ pub mod slam;
 pub mod storage;
 mod trace;
 pub mod tracking;
+mod widest;
 
 /// The recipe of the README, as a test.
 #[cfg(doctest)]

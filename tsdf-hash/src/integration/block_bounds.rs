@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::blocks::voxel_block::SIDE;
 use crate::integration::plane_image::PlaneImage;
 use crate::integration::plane_tile::{NO_RIMS, TILE, Tile};
-use crate::integration::voxel_lanes::{HALVES, LANES};
+use crate::integration::voxel_lanes::LANES;
 
 /// Blocks closer to the camera's plane are searched voxel by voxel, metres.
 const NEAREST: f32 = 1e-2;
@@ -14,15 +14,22 @@ const NEAREST: f32 = 1e-2;
 pub(crate) struct BlockBounds {
     pub(crate) start: f32,
     pub(crate) step: [f32; 3],
-    /// Of a row, from the function at its first voxel: where the lanes of each half can be in the slab.
-    pub(crate) bounds: [[f32; 2]; HALVES],
+    /// The function at the first voxel of a row that can be in the slab.
+    pub(crate) bounds: [f32; 2],
     /// Depths that voxels beside rims have, metres; the second below the first if there are none.
     pub(crate) rims: [f32; 2],
+    /// The columns and the lines of the image that the voxels project to, from the first to behind the last.
+    pub(crate) pixels: [[usize; 2]; 2],
 }
 
 impl BlockBounds {
-    const ALL: Self =
-        Self { start: 0.0, step: [0.0; 3], bounds: [[-1.0, 1.0]; HALVES], rims: [f32::NEG_INFINITY, f32::INFINITY] };
+    const ALL: Self = Self {
+        start: 0.0,
+        step: [0.0; 3],
+        bounds: [-1.0, 1.0],
+        rims: [f32::NEG_INFINITY, f32::INFINITY],
+        pixels: [[0; 2]; 2],
+    };
 
     /// Where in a block voxels can be touched, from the squares of pixels that it projects to; `None` if nowhere.
     ///
@@ -96,14 +103,14 @@ impl BlockBounds {
         let error = error + 0.5 * (omega.slope[0].abs() + omega.slope[1].abs());
         let reach = reach.map(|reach| 1.001 * (reach.abs() / near + far * error) + 1e-4);
         let rims = [rims[0] - 1.001 * rim_reach[1], rims[1] - 1.001 * rim_reach[0]];
-        Some(Self::new(1.0 - along(start), [0, 1, 2].map(|k| -along(&steps[k])), reach, rims))
+        let pixels = [0, 1].map(|k| [low[k].max(0.0) as usize, (high[k] + 1.0).min(sides[k] as f32) as usize]);
+        let pixels = pixels.map(|[from, to]| [from.min(to), to]);
+        Some(Self::new(1.0 - along(start), [0, 1, 2].map(|k| -along(&steps[k])), reach, rims, pixels))
     }
 
-    fn new(start: f32, step: [f32; 3], [behind, front]: [f32; 2], rims: [f32; 2]) -> Self {
-        let bounds = [0, LANES].map(|x| {
-            let ends = [x, x + LANES - 1].map(|x| step[0] * x as f32);
-            [-behind - ends[0].max(ends[1]), front - ends[0].min(ends[1])]
-        });
-        Self { start, step, bounds, rims }
+    fn new(start: f32, step: [f32; 3], [behind, front]: [f32; 2], rims: [f32; 2], pixels: [[usize; 2]; 2]) -> Self {
+        let end = step[0] * (LANES - 1) as f32;
+        let bounds = [-behind - end.max(0.0), front - end.min(0.0)];
+        Self { start, step, bounds, rims, pixels }
     }
 }

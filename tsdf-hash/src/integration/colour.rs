@@ -36,9 +36,9 @@ impl<'a> ColourSource<'a> {
         }
     }
 
-    /// Six-bit colour of the pixel nearest to the projection; `None` outside the colour image.
+    /// Six-bit R, G, B of the pixel nearest to the projection and a one, sixteen bits each; `None` outside the colour image.
     #[inline(always)]
-    pub(crate) fn at(&self, lanes: &ProjectedVoxels, x: usize) -> Option<[u16; 3]> {
+    pub(crate) fn at(&self, lanes: &ProjectedVoxels, x: usize) -> Option<u64> {
         let pixel = if self.is_aligned {
             lanes.index[x] as usize
         } else {
@@ -53,30 +53,29 @@ impl<'a> ColourSource<'a> {
         match self.data {
             ColourData::Rgb8(data) => {
                 let rgb = data.get(start..start + 3)?;
-                Some([six_bits(rgb[0]), six_bits(rgb[1]), six_bits(rgb[2])])
+                // `round(63 c / 255)` of all three at once: `253 c + 505` has sixteen bits.
+                let [r, g, b] = [rgb[0], rgb[1], rgb[2]].map(u64::from);
+                Some(((r | g << 16 | b << 32) * 253 + 0x01f9_01f9_01f9) >> 10 & 0x003f_003f_003f | 1 << 48)
             }
             ColourData::Rgb16(data) => {
                 let rgb = data.get(start..start + 3)?;
-                Some([rgb[0], rgb[1], rgb[2]].map(|c| ((u32::from(c) * 63 + 32767) / 65535) as u16))
+                let [r, g, b] = [rgb[0], rgb[1], rgb[2]].map(|c| (u64::from(c) * 63 + 32767) / 65535);
+                Some(r | g << 16 | b << 32 | 1 << 48)
             }
         }
     }
 }
 
-/// Adds a colour to sums or takes it out; returns whether a counter ran over or under.
+/// Adds a colour to sums or takes it out; returns whether a counter ran over or under. What a sum then carries into the next,
+/// the opposite update takes back.
 #[inline(always)]
-pub(crate) fn accumulate_colour<const INTEGRATE: bool>(sums: &mut [u16; 4], rgb: [u16; 3]) -> bool {
-    for (sum, c) in sums.iter_mut().zip([rgb[0], rgb[1], rgb[2], 1]) {
-        *sum = if INTEGRATE { sum.wrapping_add(c) } else { sum.wrapping_sub(c) };
-    }
+pub(crate) fn accumulate_colour<const INTEGRATE: bool>(sums: &mut [u16; 4], seen: u64) -> bool {
+    let [r, g, b, n] = sums.map(u64::from);
+    let all = r | g << 16 | b << 32 | n << 48;
+    let all = if INTEGRATE { all.wrapping_add(seen) } else { all.wrapping_sub(seen) };
+    *sums = [all, all >> 16, all >> 32, all >> 48].map(|sum| sum as u16);
     let [r, g, b, n] = *sums;
     // A sum that ran under is at least 65536 - 63, more than 63 n for any other n than the one just refused.
     let most = n.wrapping_mul(63);
     n > MAX_COLOURS || (!INTEGRATE && (r > most || g > most || b > most))
-}
-
-/// `round(63 c / 255)`.
-#[inline(always)]
-fn six_bits(c: u8) -> u16 {
-    ((u32::from(c) * 253 + 505) >> 10) as u16
 }

@@ -24,6 +24,7 @@ impl GapFilling {
     }
 
     /// A copy of a line, NaN where nothing was measured, with the gaps between left and right filled.
+    #[inline(always)]
     pub(crate) fn along(&self, line: &[f32], out: &mut [f32]) {
         out.copy_from_slice(line);
         let inner = out.iter_mut().skip(1).zip(line).zip(line.iter().skip(2));
@@ -33,6 +34,7 @@ impl GapFilling {
     }
 
     /// Fills the gaps of a line between the one above and the one below.
+    #[inline(always)]
     pub(crate) fn across(&self, [above, below]: [&[f32]; 2], line: &mut [f32]) {
         for ((here, &above), &below) in line.iter_mut().zip(above).zip(below) {
             *here = self.between([above, below], *here, self.slope[1]);

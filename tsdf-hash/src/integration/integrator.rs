@@ -1,21 +1,30 @@
 //! The update of one block by one frame.
 
+use std::hint::black_box;
+
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::blocks::block_key::BlockKey;
-use crate::blocks::voxel_block::{ONE, SIDE, VoxelBlock};
+use crate::blocks::voxel_block::{ONE, SIDE, VOXELS, VoxelBlock};
 use crate::error::Error;
-use crate::images::{ColourView, DepthView, Intrinsics, check_pose};
+use crate::images::{ColourData, ColourView, DepthView, Intrinsics, check_pose};
 use crate::integration::block_bounds::BlockBounds;
 use crate::integration::colour::{ColourSource, accumulate_colour};
+use crate::integration::plane::Plane;
 use crate::integration::plane_image::PlaneImage;
 use crate::integration::rims::{self, Rim};
-use crate::integration::voxel_lanes::{HALVES, LANES, ProjectedVoxels, RowOffsets, mask};
+use crate::integration::voxel_lanes::{LANES, ProjectedVoxels, RowOffsets, mask};
 use crate::rounding::{ROUNDER, max, min, rounded};
 use crate::settings::Settings;
+use crate::widest::{self, Work};
 
 /// Colours are taken this close to the surface, in voxels (ours).
 const COLOUR_REACH: f64 = 1.5;
+/// Pixels under a block beyond which its voxels read but a part of them: each has sixteen for itself (ours).
+const MOST_FETCHED: usize = 16 * VOXELS;
+/// Bytes that come from memory at once.
+const CACHE_LINE: usize = 64;
+
 /// Whether a frame is put in or taken out.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Operation {
@@ -110,10 +119,7 @@ impl<'a> Frame<'a> {
 
     /// Adds the frame to a block, or takes it out. What is touched, and by how much, depends on the frame only.
     pub(crate) fn apply(&self, operation: Operation, key: BlockKey, block: &mut VoxelBlock) -> UpdateCount {
-        match operation {
-            Operation::Integrate => self.update::<true>(key, block),
-            Operation::Deintegrate => self.update::<false>(key, block),
-        }
+        widest::run(BlockUpdate { frame: self, operation, key, block })
     }
 
     /// `(u z, v z, z)` of the first voxel of a block.
@@ -157,17 +163,44 @@ impl<'a> Frame<'a> {
     /// What is behind a surface may be in front of another that this frame does not see: it weighs less the deeper it is.
     ///
     /// `front` is `μ`, or the distance that is carved if that is larger. `start` and the steps are computed in double precision and rounded once.
+    #[inline(always)]
     fn update<const INTEGRATE: bool>(&self, key: BlockKey, block: &mut VoxelBlock) -> UpdateCount {
         let (start, step) = (self.start(key), self.step());
         let steps = [0, 1, 2].map(|axis| step.column(axis).into_owned());
         let Some(bounds) = BlockBounds::under(self.plane_image, self.reach, self.rim_reach, &start, &steps) else {
             return UpdateCount::default();
         };
+        self.fetch(bounds.pixels);
         if bounds.rims[0] <= bounds.rims[1] {
             self.update_rows::<INTEGRATE, true>(block, &start, &steps, &bounds)
         } else {
             self.update_rows::<INTEGRATE, false>(block, &start, &steps, &bounds)
         }
+    }
+
+    /// Reads the pixels under a block once, line by line: what is not in the cache is then on its way for all of them at
+    /// once, where each row of voxels would wait for its own.
+    #[inline(always)]
+    fn fetch(&self, [columns, lines]: [[usize; 2]; 2]) {
+        if (columns[1] - columns[0]) * (lines[1] - lines[0]) > MOST_FETCHED {
+            return;
+        }
+        let width = self.plane_image.width;
+        let mut read = 0;
+        for line in (lines[0]..lines[1]).map(|line| line * width) {
+            let pixels = line + columns[0]..line + columns[1];
+            for plane in self.plane_image.planes[pixels.clone()].iter().step_by(CACHE_LINE / size_of::<Plane>()) {
+                read |= plane.offset.to_bits();
+            }
+            if let Some(ColourData::Rgb8(data)) = self.colour.as_ref().filter(|c| c.is_aligned).map(|c| c.data)
+                && let Some(pixels) = data.get(3 * pixels.start..3 * pixels.end)
+            {
+                for &byte in pixels.iter().step_by(CACHE_LINE) {
+                    read |= u32::from(byte);
+                }
+            }
+        }
+        black_box(read);
     }
 
     #[inline(always)]
@@ -179,26 +212,26 @@ impl<'a> Frame<'a> {
         bounds: &BlockBounds,
     ) -> UpdateCount {
         let [sx, sy, sz] = steps;
-        let offsets = [0, LANES].map(|first| RowOffsets::new(sx, first));
+        let offsets = RowOffsets::new(sx);
+        let end = offsets.depth[LANES - 1];
+        let ([least, most], ends) = (bounds.bounds, [min(end, 0.0), max(end, 0.0)]);
         let mut counts = LaneCounts::default();
         for z in 0..SIDE {
             for y in 0..SIDE {
                 let along = bounds.start + bounds.step[1] * y as f32 + bounds.step[2] * z as f32;
                 let row = (start + sy * y as f32) + sz * z as f32;
-                for (half, (offsets, [least, most])) in offsets.iter().zip(bounds.bounds).enumerate() {
-                    let beside = RIMS && {
-                        let ends = [offsets.depth[0], offsets.depth[LANES - 1]].map(|depth| row.z + depth);
-                        ends[0].max(ends[1]) >= bounds.rims[0] && ends[0].min(ends[1]) <= bounds.rims[1]
-                    };
-                    let near = along >= least && along <= most;
-                    if near || beside {
-                        let lanes = self.project(&row, offsets);
-                        if !near
-                            && lanes.index.iter().all(|&pixel| self.plane_image.rims.rims[pixel as usize] == Rim::NONE)
-                        {
-                            continue;
-                        }
-                        self.accumulate::<INTEGRATE, RIMS>(block, half + HALVES * (y + SIDE * z), &lanes, &mut counts);
+                let beside = RIMS && row.z + ends[1] >= bounds.rims[0] && row.z + ends[0] <= bounds.rims[1];
+                let near = along >= least && along <= most;
+                if near || beside {
+                    let lanes = self.project(&row, &offsets);
+                    if !near && lanes.index.iter().all(|&pixel| self.plane_image.rims.rims[pixel as usize] == Rim::NONE)
+                    {
+                        continue;
+                    }
+                    if beside {
+                        self.accumulate::<INTEGRATE, RIMS>(block, y + SIDE * z, &lanes, &mut counts);
+                    } else {
+                        self.accumulate::<INTEGRATE, false>(block, y + SIDE * z, &lanes, &mut counts);
                     }
                 }
             }
@@ -246,20 +279,21 @@ impl<'a> Frame<'a> {
         (known, max(max(aside - self.half_voxel, ahead), 0.0) * self.per_metre)
     }
 
-    /// Updates the voxels `LANES unit..`.
+    /// Updates a row of voxels.
     #[inline(always)]
     fn accumulate<const INTEGRATE: bool, const RIMS: bool>(
         &self,
         block: &mut VoxelBlock,
-        unit: usize,
+        row: usize,
         lanes: &ProjectedVoxels,
         counts: &mut LaneCounts,
     ) {
-        let planes = lanes.index.map(|index| self.plane_image.planes[index as usize]);
-        let offset = planes.map(|plane| plane.offset);
-        let omega = planes.map(|plane| plane.scaled_omega);
-        let slope_u = planes.map(|plane| plane.scaled_slope[0]);
-        let slope_v = planes.map(|plane| plane.scaled_slope[1]);
+        let [mut offset, mut omega, mut slope_u, mut slope_v] = [[0.0; LANES]; 4];
+        for x in 0..LANES {
+            let plane = &self.plane_image.planes[lanes.index[x] as usize];
+            (offset[x], omega[x]) = (plane.offset, plane.scaled_omega);
+            [slope_u[x], slope_v[x]] = plane.scaled_slope;
+        }
         let (mut touched, mut own) = ([0; LANES], [0; LANES]);
         for x in 0..LANES {
             // A NaN fails, and so does an omega of 0.
@@ -270,7 +304,10 @@ impl<'a> Frame<'a> {
         }
         let mut beside = [f32::INFINITY; LANES];
         if RIMS {
-            let rims = lanes.index.map(|index| self.plane_image.rims.rims[index as usize]);
+            let mut rims = [Rim::NONE; LANES];
+            for (rim, &index) in rims.iter_mut().zip(&lanes.index) {
+                *rim = self.plane_image.rims.rims[index as usize];
+            }
             for x in 0..LANES {
                 let in_front = mask(offset[x] - lanes.depth[x] * omega[x] >= self.reach[0] * omega[x]);
                 let (known, distance) = self.beside(rims[x], lanes.depth[x]);
@@ -281,35 +318,41 @@ impl<'a> Frame<'a> {
         if touched == [0; LANES] {
             return;
         }
-        let sums = &mut block.distance.as_chunks_mut::<LANES>().0[unit];
-        let totals = &mut block.weight.as_chunks_mut::<LANES>().0[unit];
-        let mut coloured = [0; LANES];
+        let sums = &mut block.distance.as_chunks_mut::<LANES>().0[row];
+        let totals = &mut block.weight.as_chunks_mut::<LANES>().0[row];
+        let (mut coloured, mut weights, mut products) = ([0; LANES], [0; LANES], [0; LANES]);
         for x in 0..LANES {
             let at_voxel = omega[x] + (slope_u[x] * lanes.du[x] + slope_v[x] * lanes.dv[x]);
             let q = offset[x] - lanes.depth[x] * at_voxel;
             coloured[x] = mask(q.abs() < self.colour_reach) & own[x];
-            let q = if RIMS && beside[x] < q { beside[x] } else { q };
-            let q = if q > -LIMIT { q } else { -LIMIT };
-            let q = if q < LIMIT { q } else { LIMIT };
+            let q = if RIMS { min(beside[x], q) } else { q };
+            let q = min(max(q, -LIMIT), LIMIT);
             let q = (q + ROUNDER) - ROUNDER;
             // Integers below 2^22 and a power of two: all of it is exact until it is rounded.
             let seen = (slope_v[x].to_bits().cast_signed() & 15) as f32;
             let left = seen + seen * min(q + FULL, 0.0) * FADING;
-            let weight = rounded(max(left, 1.0)) & touched[x];
-            let product = rounded(q * weight as f32) & touched[x];
+            let weight = rounded(max(left, 1.0));
+            weights[x] = weight & touched[x];
+            products[x] = rounded(q * weight as f32) & touched[x];
+        }
+        let mut counters = [0; LANES];
+        for x in 0..LANES {
             let (sum, total) = if INTEGRATE {
-                (sums[x].wrapping_add(product), i32::from(totals[x]) + weight)
+                (sums[x].wrapping_add(products[x]), i32::from(totals[x]) + weights[x])
             } else {
-                (sums[x].wrapping_sub(product), i32::from(totals[x]) - weight)
+                (sums[x].wrapping_sub(products[x]), i32::from(totals[x]) - weights[x])
             };
             sums[x] = sum;
             totals[x] = total as u16;
-            counts.counters[x] |= total;
+            counters[x] = total;
             if !INTEGRATE {
                 // No sum of observations can leave `-32767 W..=32767 W`: what was taken out was not in.
                 let most = (total << 15).wrapping_sub(total);
-                counts.counters[x] |= most.wrapping_sub(sum.wrapping_abs()) & i32::MIN & touched[x];
+                counters[x] |= most.wrapping_sub(sum.wrapping_abs()) & i32::MIN & touched[x];
             }
+        }
+        for x in 0..LANES {
+            counts.counters[x] |= counters[x];
             counts.touched[x] -= touched[x];
         }
         if let Some(colour) = self.colour.as_ref().filter(|_| coloured != [0; LANES]) {
@@ -317,9 +360,29 @@ impl<'a> Frame<'a> {
                 if near != 0
                     && let Some(rgb) = colour.at(lanes, x)
                 {
-                    counts.colour_overflow |= accumulate_colour::<INTEGRATE>(&mut block.colour[LANES * unit + x], rgb);
+                    counts.colour_overflow |= accumulate_colour::<INTEGRATE>(&mut block.colour[LANES * row + x], rgb);
                 }
             }
+        }
+    }
+}
+
+/// A frame on its way into a block, or out of it.
+struct BlockUpdate<'a> {
+    frame: &'a Frame<'a>,
+    operation: Operation,
+    key: BlockKey,
+    block: &'a mut VoxelBlock,
+}
+
+impl Work for BlockUpdate<'_> {
+    type Output = UpdateCount;
+
+    #[inline(always)]
+    fn run(self) -> UpdateCount {
+        match self.operation {
+            Operation::Integrate => self.frame.update::<true>(self.key, self.block),
+            Operation::Deintegrate => self.frame.update::<false>(self.key, self.block),
         }
     }
 }

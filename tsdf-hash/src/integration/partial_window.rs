@@ -3,7 +3,7 @@
 use crate::images::Intrinsics;
 use crate::integration::gap_filling::{GRANTED, STEEPEST};
 use crate::integration::inverse_depth_noise::InverseDepthNoise;
-use crate::integration::plane_windows::HALO;
+use crate::integration::plane_windows::{HALO, LANES};
 
 /// Pixels of the window along a row and a column.
 const SIDE: usize = 5;
@@ -30,11 +30,15 @@ impl PartialWindow {
     /// of one.
     ///
     /// First all count that a surface through the pixel can reach, then those within the noise of the plane fitted to them.
+    #[inline(always)]
     pub(crate) fn slopes(&self, lines: [&[f32]; SIDE], u: usize) -> [Lanes; 2] {
         let window = lines.map(|line| {
             let line = &line[u + HALO - SIDE / 2..][..SIDE + LANES - 1];
-            let column = |x: usize| lanes(|k| line[x + k]);
-            [column(0), column(1), column(2), column(3), column(4)]
+            let mut columns = [[0.0; LANES]; SIDE];
+            for (x, column) in columns.iter_mut().enumerate() {
+                column.copy_from_slice(&line[x..x + LANES]);
+            }
+            columns
         });
         let own = window[SIDE / 2][SIDE / 2];
         let granted = lanes(|k| GRANTED * self.noise.sigma_inverse(own[k]));
@@ -47,13 +51,15 @@ impl PartialWindow {
     }
 }
 
-/// Neighbouring pixels whose windows are summed side by side: a vector register.
-pub(crate) const LANES: usize = 4;
 type Lanes = [f32; LANES];
 
 #[inline(always)]
-fn lanes(value: impl FnMut(usize) -> f32) -> Lanes {
-    std::array::from_fn(value)
+fn lanes(value: impl Fn(usize) -> f32) -> Lanes {
+    let mut all = [0.0; LANES];
+    for (k, one) in all.iter_mut().enumerate() {
+        *one = value(k);
+    }
+    all
 }
 
 #[inline(always)]

@@ -11,14 +11,15 @@ use crate::error::Error;
 use crate::images::{DepthView, Intrinsics};
 use crate::integration::block_selection::{select_around_rims, select_blocks};
 use crate::integration::inverse_depth_noise::InverseDepthNoise;
-use crate::integration::partial_window::{LANES, PartialWindow};
+use crate::integration::partial_window::PartialWindow;
 use crate::integration::plane::Plane;
 use crate::integration::plane_tile::{TILE, Tile, TileLine};
-use crate::integration::plane_windows::{BEND_VARIANCE, BENDING, COUNT, ROUGHNESS, Row, SPREAD, Windows};
+use crate::integration::plane_windows::{BEND_VARIANCE, BENDING, COUNT, LANES, ROUGHNESS, Row, SPREAD, Windows};
 use crate::integration::rims::RimImage;
 use crate::parallel::in_chunks;
 use crate::rounding::ROUNDER;
 use crate::settings::Settings;
+use crate::widest::{self, Work};
 
 /// Steeper views of a surface are left to other frames (ours: 84 degrees between ray and normal).
 const LEAST_COSINE: f32 = 0.1;
@@ -79,7 +80,7 @@ impl PlaneImage {
         let found = in_chunks(&mut bands, settings.threads, |bands| {
             let mut all = ([0; 3], Ok(Vec::new()), Vec::new());
             for band in bands {
-                let (counts, edges) = band.fill(depth, settings);
+                let (counts, edges) = widest::run(BandFilling { band, depth, settings });
                 let keys = select_blocks(band.first, band.planes, band.tiles, depth, world_from_camera, settings);
                 all = ([0, 1, 2].map(|k| all.0[k] + counts[k]), keys, edges);
             }
@@ -125,8 +126,25 @@ impl PlaneImage {
     }
 }
 
+/// A band that is to be filled.
+struct BandFilling<'a, 'b> {
+    band: &'a mut Band<'b>,
+    depth: &'a DepthView<'a>,
+    settings: &'a Settings,
+}
+
+impl Work for BandFilling<'_, '_> {
+    type Output = ([usize; 3], Vec<u32>);
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        self.band.fill(self.depth, self.settings)
+    }
+}
+
 impl Band<'_> {
     /// Returns how many pixels of the band have a depth in the range, how many of them are fused, and how many gaps are filled.
+    #[inline(always)]
     fn fill(&mut self, depth: &DepthView, settings: &Settings) -> ([usize; 3], Vec<u32>) {
         let width = depth.width;
         let noise = InverseDepthNoise::new(settings);
@@ -169,6 +187,7 @@ impl Columns {
         Self { offset: column(), slope: [column(), column()], omega: column() }
     }
 
+    #[inline(always)]
     fn write(&self, planes: &mut [Plane]) {
         let slopes = self.slope[0].iter().zip(&self.slope[1]);
         for (((plane, &offset), &omega), (&u, &v)) in planes.iter_mut().zip(&self.offset).zip(&self.omega).zip(slopes) {
@@ -179,6 +198,7 @@ impl Columns {
 
 /// Fits the planes of a row. Structures of arrays, because the
 /// arithmetic then runs in vector registers.
+#[inline(always)]
 fn read_row(row: &Row, lens: Lens, noise: InverseDepthNoise, out: &mut Columns) {
     // Slices of known length spare the loop its bounds checks.
     let width = out.omega.len();
@@ -211,6 +231,7 @@ fn read_row(row: &Row, lens: Lens, noise: InverseDepthNoise, out: &mut Columns) 
 }
 
 /// The pixels beside gaps and edges that [`read_row`] has left out.
+#[inline(always)]
 fn read_edges(
     row: &Row,
     lens: Lens,
@@ -241,15 +262,16 @@ fn read_edges(
 }
 
 /// Pixels that were measured, those of them that are fused, and gaps that are filled.
+#[inline(always)]
 fn count(measured: &[f32], omega: &[f32]) -> [u32; 3] {
-    let mut counts = [0; 3];
+    let (mut valid, mut fused, mut both) = (0, 0, 0);
     for (&measured, &omega) in measured.iter().zip(omega) {
-        let (valid, fused) = (u32::from(measured > 0.0), u32::from(omega > 0.0));
-        counts[0] += valid;
-        counts[1] += valid & fused;
-        counts[2] += fused & !valid;
+        let (is_valid, is_fused) = (u32::from(measured > 0.0), u32::from(omega > 0.0));
+        valid += is_valid;
+        fused += is_fused;
+        both += is_valid & is_fused;
     }
-    counts
+    [valid, both, fused - both]
 }
 
 /// A plane at a pixel, as [`Plane`] keeps it; with an inverse depth of 0 if it is seen too steeply, or is none.

@@ -71,6 +71,7 @@ impl TileLine {
     }
 
     /// Adds a row of inverse depths, 0 where a pixel is not fused.
+    #[inline(always)]
     pub(crate) fn push(&mut self, omegas: &[f32]) {
         if self.omegas.is_empty() {
             self.low.fill(f32::INFINITY);
@@ -86,6 +87,7 @@ impl TileLine {
 
     /// Describes the squares of the rows that were added, of which the image's row `first` is the topmost, and forgets
     /// the rows.
+    #[inline(always)]
     pub(crate) fn finish(&mut self, first: usize, planes: &[Plane], tiles: &mut [Tile]) {
         let width = self.width;
         let rows = self.omegas.len() / width;
@@ -121,6 +123,7 @@ impl TileLine {
     }
 }
 
+#[inline(always)]
 fn widen(omegas: &[f32], row: f32, base: &[f32], down: &[f32], error: &mut [f32]) {
     for (((&omega, &base), &down), error) in omegas.iter().zip(base).zip(down).zip(error) {
         let off = (omega - (base + row * down)).abs();

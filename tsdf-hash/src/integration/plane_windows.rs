@@ -13,6 +13,9 @@ use crate::settings::Settings;
 const RADIUS: usize = 3;
 /// Pixels of context on each side of a row: the window, one for the edge test, and one for the filling of gaps.
 pub(crate) const HALO: usize = RADIUS + 2;
+/// Neighbouring pixels whose windows are summed side by side at edges: the widest vector register. Lines are so much longer,
+/// because their last pixels have neighbours, too.
+pub(crate) const LANES: usize = 8;
 /// Lines in a ring: from the first line of a window to the one that its last gap needs.
 const RING: usize = 2 * HALO;
 /// Values in the window.
@@ -101,7 +104,7 @@ pub(crate) struct Row<'a> {
 
 impl<'a> Windows<'a> {
     pub(crate) fn new(depth: &'a DepthView<'a>, settings: &Settings, first: usize) -> Self {
-        let (width, padded) = (depth.width, depth.width + 2 * HALO);
+        let (width, padded) = (depth.width, depth.width + 2 * HALO + LANES);
         let mut windows = Self {
             depth,
             first,
@@ -125,6 +128,7 @@ impl<'a> Windows<'a> {
     }
 
     /// The row `row` of the band; they are asked for in order.
+    #[inline(always)]
     pub(crate) fn row(&mut self, row: usize) -> Row<'_> {
         self.push(row + RING);
         let width = self.depth.width;
@@ -147,6 +151,7 @@ impl<'a> Windows<'a> {
     }
 
     /// Reads line `k`, fills the gaps of the line before it, and finishes the one before that.
+    #[inline(always)]
     fn push(&mut self, k: usize) {
         self.read(k);
         let width = self.depth.width;
@@ -171,6 +176,7 @@ impl<'a> Windows<'a> {
         add_line(&self.rough, self.roughness.line_mut(line));
     }
 
+    #[inline(always)]
     fn read(&mut self, k: usize) {
         let width = self.depth.width;
         let (near, far) = (self.near, self.far);
@@ -197,6 +203,7 @@ impl<'a> Windows<'a> {
 
 /// A copy of a line with NaN where the 3x3 patch has a gap, or bends or jumps by more than four standard deviations of
 /// its noise; and the sum of its squared second differences, which is 24 times the variance of noise on a plane.
+#[inline(always)]
 fn smooth_line(around: [&[f32]; 3], noise: InverseDepthNoise, out: &mut [f32], rough: &mut [f32]) {
     let width = out.len();
     let rough = &mut rough[..width];
@@ -218,6 +225,7 @@ fn smooth_line(around: [&[f32]; 3], noise: InverseDepthNoise, out: &mut [f32], r
 }
 
 /// Sum, first moment and second difference of seven neighbours along a line.
+#[inline(always)]
 fn sum_line(source: &[f32], total: &mut [f32], moment: &mut [f32], bend: &mut [f32]) {
     let width = total.len();
     let (source, moment, bend) = (&source[..width + 6], &mut moment[..width], &mut bend[..width]);
@@ -228,6 +236,7 @@ fn sum_line(source: &[f32], total: &mut [f32], moment: &mut [f32], bend: &mut [f
 }
 
 /// Sum of seven neighbours along a line.
+#[inline(always)]
 fn add_line(source: &[f32], out: &mut [f32]) {
     let width = out.len();
     let source = &source[..width + 6];
@@ -246,6 +255,7 @@ fn seven(x: [f32; 7]) -> (f32, f32, f32) {
 }
 
 /// [`seven`] across lines.
+#[inline(always)]
 fn sum_lines(lines: [&[f32]; 7], total: &mut [f32], moment: &mut [f32], bend: &mut [f32]) {
     let width = total.len();
     let ([a, b, c, d, e, f, g], moment, bend) =
@@ -256,6 +266,7 @@ fn sum_lines(lines: [&[f32]; 7], total: &mut [f32], moment: &mut [f32], bend: &m
 }
 
 /// Adds seven lines to `out`, or replaces it.
+#[inline(always)]
 fn add_lines(lines: [&[f32]; 7], keep: bool, out: &mut [f32]) {
     let width = out.len();
     let [a, b, c, d, e, f, g] = lines.map(|line| &line[..width]);

@@ -4,10 +4,8 @@ use nalgebra::Vector3;
 
 use crate::blocks::voxel_block::SIDE;
 
-/// Neighbours along x that are updated together: a vector register.
-pub(crate) const LANES: usize = 4;
-/// Such groups in a row of a block.
-pub(crate) const HALVES: usize = SIDE / LANES;
+/// Neighbours along x that are updated together, a row of a block: the widest vector register.
+pub(crate) const LANES: usize = SIDE;
 
 /// All ones, or zero.
 #[inline(always)]
@@ -30,7 +28,7 @@ pub(crate) struct ProjectedVoxels {
     pub(crate) dv: [f32; LANES],
 }
 
-/// From the first voxel of a row to some neighbours: the change of `(u z, v z, z)`.
+/// From the first voxel of a row to each: the change of `(u z, v z, z)`.
 pub(crate) struct RowOffsets {
     pub(crate) u: [f32; LANES],
     pub(crate) v: [f32; LANES],
@@ -38,8 +36,8 @@ pub(crate) struct RowOffsets {
 }
 
 impl RowOffsets {
-    pub(crate) fn new(step: &Vector3<f32>, first: usize) -> Self {
-        let along: [f32; LANES] = std::array::from_fn(|x| (first + x) as f32);
+    pub(crate) fn new(step: &Vector3<f32>) -> Self {
+        let along: [f32; LANES] = std::array::from_fn(|x| x as f32);
         Self { u: along.map(|x| step.x * x), v: along.map(|x| step.y * x), depth: along.map(|x| step.z * x) }
     }
 }
