@@ -241,14 +241,18 @@ fn read_edges(
     mut found: impl FnMut(usize),
 ) {
     let width = out.omega.len();
-    let is_edge = |u: usize| row.measured[u] > 0.0 && row.smooth[u].is_nan();
+    let is_edge = |measured: f32, smooth: f32| (measured > 0.0) & smooth.is_nan();
     for first in (0..width).step_by(LANES) {
-        let group = first..(first + LANES).min(width);
-        if !group.clone().any(is_edge) {
+        // What is left at the end of the row is looked at in any case.
+        if let Some(measured) = row.measured[first..].first_chunk::<LANES>()
+            && let Some(smooth) = row.smooth[first..].first_chunk::<LANES>()
+            && !measured.iter().zip(smooth).fold(false, |any, (&m, &s)| any | is_edge(m, s))
+        {
             continue;
         }
+        let group = first..(first + LANES).min(width);
         let [along, down] = partial.slopes(row.wide, first);
-        for u in group.filter(|&u| is_edge(u)) {
+        for u in group.filter(|&u| is_edge(row.measured[u], row.smooth[u])) {
             let slope = [along, down].map(|slope| slope[u - first]);
             if slope[0].is_nan() {
                 continue;
