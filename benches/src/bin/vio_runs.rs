@@ -81,6 +81,9 @@ fn main() -> ExitCode {
 /// Squared errors in units of the claimed covariance: position, attitude, velocity, both biases.
 const NEES: [&str; 5] = ["position", "attitude", "velocity", "gyro_bias", "accel_bias"];
 
+/// Deviations of recorded truth along each axis, as the report of `vio` has them: m, rad, m/s.
+const TRUTH_SIGMA: [f64; 5] = [1e-3, 0.1 * std::f64::consts::PI / 180.0, 3e-3, 0.0, 0.0];
+
 struct Outcome {
     se3: f64,
     yaw: f64,
@@ -259,7 +262,8 @@ fn follow(
         truth.push(odometry.stamp, motion.world_from_body)?;
         estimate.push(odometry.stamp, odometry.world_from_body)?;
         let (gyro, accel) = recording.biases_at(odometry.stamp);
-        let mut squares = nees(&odometry, &motion, [gyro, accel]);
+        let of_truth = if real { TRUTH_SIGMA } else { [0.0; 5] };
+        let mut squares = nees(&odometry, &motion, [gyro, accel], &of_truth);
         if real {
             // Nobody knows the biases.
             squares[3..].fill(f64::NAN);
@@ -310,7 +314,7 @@ fn start(simulation: &Simulation, stamp: Stamp, imu: &ImuModel, seed: u64) -> Re
     })
 }
 
-fn nees(o: &Odometry, truth: &vio_ekf::trajectory::Motion, biases: [Vector3<f64>; 2]) -> [f64; 5] {
+fn nees(o: &Odometry, truth: &vio_ekf::trajectory::Motion, biases: [Vector3<f64>; 2], of_truth: &[f64; 5]) -> [f64; 5] {
     let errors = [
         truth.world_from_body.translation.vector - o.world_from_body.translation.vector,
         so3::log(&(truth.world_from_body.rotation * o.world_from_body.rotation.inverse())),
@@ -320,7 +324,7 @@ fn nees(o: &Odometry, truth: &vio_ekf::trajectory::Motion, biases: [Vector3<f64>
     ];
     std::array::from_fn(|k| {
         let row = 3 * [0, 2, 1, 3, 4][k];
-        let block = o.covariance.fixed_view::<3, 3>(row, row).into_owned();
+        let block = o.covariance.fixed_view::<3, 3>(row, row) + Matrix3::identity() * of_truth[k].powi(2);
         block.cholesky().map_or(0.0, |factor| errors[k].dot(&factor.solve(&errors[k])))
     })
 }
