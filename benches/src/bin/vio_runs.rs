@@ -182,14 +182,7 @@ fn follow(
     let recording = simulation.imu(0)?;
     let read = if real { real_samples(&arguments.data, name, simulation.spline())? } else { recording.samples.clone() };
     let [left, right] = cameras(name);
-    let calibrations =
-        [left, right].map(|camera| CameraCalibration { camera, rate_hz: None, time_offset_s: 0.0, row_time_s: 0.0 });
-    let sensor = ImuCalibration { noise: imu.noise, rate_hz: 200.0, body_from_imu: Isometry3::identity() };
-    let mut vio = match (own_start, arguments.stereo) {
-        (true, stereo) => Vio::from_calibration(&calibrations[..if stereo { 2 } else { 1 }], &sensor, *settings)?,
-        (false, true) => Vio::stereo(left, right, imu.noise, *settings)?,
-        (false, false) => Vio::new(left, imu.noise, *settings)?,
-    };
+    let mut vio = filter([left, right], settings, arguments.stereo, own_start)?;
     let mut samples = read.iter();
     let first = samples.next().ok_or("the sequence is too short")?;
     vio.imu(first)?;
@@ -282,6 +275,22 @@ fn follow(
         std::fs::write(folder.join(format!("{name}_{seed}.tum")), tum::write(&estimate))?;
     }
     Ok(outcome)
+}
+
+/// As a recording's calibration makes it for a start of its own; otherwise with a clock that is exact.
+fn filter([left, right]: [Camera; 2], settings: &Settings, stereo: bool, own_start: bool) -> Result<Vio, AnyError> {
+    let noise = ImuModel::default().noise;
+    if !own_start {
+        return Ok(if stereo {
+            Vio::stereo(left, right, noise, *settings)?
+        } else {
+            Vio::new(left, noise, *settings)?
+        });
+    }
+    let calibrations =
+        [left, right].map(|camera| CameraCalibration { camera, rate_hz: None, time_offset_s: 0.0, row_time_s: 0.0 });
+    let imu = ImuCalibration { noise, rate_hz: 200.0, body_from_imu: Isometry3::identity() };
+    Ok(Vio::from_calibration(&calibrations[..if stereo { 2 } else { 1 }], &imu, *settings)?)
 }
 
 /// What the accelerometer reads of the specific force. Each axis leans towards the next and away from the other.
