@@ -152,10 +152,10 @@ def integration():
     rows = table("integration")
     figure, axes = plt.subplots(figsize=(5.6, 2.2))
     bars(axes, [f"{row['voxel_mm']} mm" for row in rows],
-         [("tsdf-hash", numbers(rows, "tsdf_hash_ms"), OURS), ("Open3D 0.19", numbers(rows, "open3d_ms"), OTHER)])
+         [("tsdf-hash", numbers(rows, "tsdf_hash_ms"), OURS), ("Open3D 0.20", numbers(rows, "open3d_ms"), OTHER)])
     for container in axes.containers:
         axes.bar_label(container, padding=3, fontsize=8)
-    axes.set(xlabel="CPU time of one image of 640 × 480, ms", ylabel="voxel", xlim=(0, 150))
+    axes.set(xlabel="CPU time of one image of 640 × 480, ms", ylabel="voxel", xlim=(0, 1.12 * max(numbers(rows, "open3d_ms"))))
     axes.legend(loc="upper right")
     return figure
 
