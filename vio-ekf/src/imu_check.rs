@@ -19,5 +19,6 @@ pub use axes::{AxesCheck, check_imu_axes};
 pub use diagnosis::{AxesDiagnosis, MisreadSensor, diagnose_axes};
 pub use images::check_axes_with_images;
 pub use reading::AxesReading;
+pub(crate) use validation::gravity_scale;
 pub use validation::{ImuValidation, ImuWarning, validate_samples};
 pub use window::busiest_window;

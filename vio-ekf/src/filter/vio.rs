@@ -349,6 +349,12 @@ impl Vio {
         Ok(changed)
     }
 
+    /// A filter of the first of two cameras that has not started.
+    pub(crate) fn first_camera_alone(&self) -> Option<Self> {
+        let mut alone = self.with_settings(self.settings()).ok()?;
+        alone.sensors.stereo.take().map(|_| alone)
+    }
+
     /// A filter of the same sensors that has not started, with other settings.
     pub(crate) fn with_settings(&self, settings: &Settings) -> Result<Self, Error> {
         settings.check()?;

@@ -332,6 +332,17 @@ fn check_gravity(windows: &[Window], gravity: f64) -> Result<Vec<ImuWarning>, Er
     Ok(warnings)
 }
 
+/// The factor on readings of an accelerometer by which gravity is as long as it should be, where it is not.
+pub(crate) fn gravity_scale(samples: &[Imu], gravity: f64) -> Option<f64> {
+    let (first, last) = (samples.first()?, samples.last()?);
+    let rate_hz = (samples.len() - 1) as f64 / last.stamp.secs_since(first.stamp);
+    let found = validate_samples(samples, rate_hz, gravity).ok()?;
+    found.warnings.iter().find_map(|warning| match warning {
+        ImuWarning::Gravity { force, gravity } => Some(gravity / force),
+        _ => None,
+    })
+}
+
 /// Whether what the forces of sound axes have in common is as long as gravity.
 fn check_length(windows: &[Window], gravity: f64) -> Option<ImuWarning> {
     let mut lengths: Vec<f64> = windows.iter().flat_map(Window::mean_forces).collect();
@@ -350,4 +361,24 @@ fn quarter_turns() -> impl Iterator<Item = Matrix3<f64>> {
 fn names(axes: &Matrix3<f64>) -> String {
     let axes = if axes.sum() < 0.0 { -axes } else { *axes };
     axis_names(&axes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::{Scenario, Simulation, swaying_flight};
+
+    #[test]
+    fn gravity_is_as_long_as_the_scale_of_the_accelerometer_says() {
+        let phases = [Vector3::new(0.3, 1.9, 4.0), Vector3::zeros(), Vector3::new(2.0, 0.1, 1.0), Vector3::x()];
+        let flight = Simulation::new(swaying_flight(&phases, 30.0).unwrap(), Scenario::default()).unwrap();
+        let mut samples = flight.imu(0).unwrap().samples;
+        assert_eq!(gravity_scale(&samples, 9.81), None);
+        for sample in &mut samples {
+            sample.accel *= 0.94;
+        }
+        let scale = gravity_scale(&samples, 9.81).unwrap();
+        assert!((scale * 0.94 - 1.0).abs() < 0.02, "{scale}");
+        assert_eq!(gravity_scale(&samples[..1], 9.81), None);
+    }
 }

@@ -13,7 +13,7 @@ const FEWEST: usize = 50;
 /// Images after which it ends in any case.
 const MOST: usize = 400;
 /// What a part has to take off the contradiction, as a share of it, and the accelerometer besides, whose scale and axes every filter
-/// finds by itself where it has to: ours.
+/// finds by itself where it has to, unless it reads gravity too long or too short: ours.
 const PART: f64 = 0.03;
 const ACCELEROMETER: f64 = 0.07;
 
@@ -32,6 +32,8 @@ pub(super) struct CalibrationTrial {
 #[derive(Debug, Clone)]
 struct Contender {
     doubt: Option<CalibrationDoubt>,
+    /// Whether gravity's length has raised it, not images.
+    by_gravity: bool,
     vio: Vio,
     has_diverged: bool,
     /// Contradiction by image; `None` for those that it did not follow.
@@ -39,11 +41,19 @@ struct Contender {
 }
 
 impl CalibrationTrial {
-    /// `given` has not started. What cannot be put in place of what was given is left out.
-    pub(super) fn new(given: &Vio, doubts: Vec<CalibrationDoubt>) -> Self {
-        let found = doubts.into_iter().filter_map(|doubt| Some((corrected(given, &doubt)?, Some(doubt))));
-        let all = std::iter::once((given.clone(), None)).chain(found);
-        let contender = |(vio, doubt)| Contender { doubt, vio, has_diverged: false, contradictions: Vec::new() };
+    /// `given` has not started; the doubts are those of images, and that of gravity's length. What cannot be put in place of what was
+    /// given is left out.
+    pub(super) fn new(given: &Vio, doubts: Vec<CalibrationDoubt>, by_gravity: Option<CalibrationDoubt>) -> Self {
+        let doubts = doubts.into_iter().map(|doubt| (doubt, false)).chain(by_gravity.map(|doubt| (doubt, true)));
+        let found = doubts.filter_map(|(doubt, by_gravity)| Some((corrected(given, &doubt)?, Some(doubt), by_gravity)));
+        let all = std::iter::once((given.clone(), None, false)).chain(found);
+        let contender = |(vio, doubt, by_gravity)| Contender {
+            doubt,
+            by_gravity,
+            vio,
+            has_diverged: false,
+            contradictions: Vec::new(),
+        };
         Self { filters: all.map(contender).collect(), images: 0 }
     }
 
@@ -74,17 +84,19 @@ impl CalibrationTrial {
     }
 
     /// What is left of the doubt; all of it where too little was seen, or nothing serves. A calibration with which a filter does not start,
-    /// or not for long, where another does, is out.
+    /// or not for long, where another does, is out. Gravity alone does not decide: a biased accelerometer, too, may not start in flight.
     pub(super) fn finish(&self) -> Option<CalibrationDoubt> {
         let most = self.filters.iter().map(Contender::followed).max().unwrap_or(0);
         let serves = |one: &&Contender| most >= FEWEST && !one.has_diverged && 2 * one.followed() > most;
-        let running: Vec<&Contender> = self.filters.iter().filter(serves).collect();
+        let given_serves = self.filters.first().is_some_and(|given| serves(&given));
+        let may_win = |one: &&Contender| serves(one) && (given_serves || !one.by_gravity);
+        let running: Vec<&Contender> = self.filters.iter().filter(may_win).collect();
         let compared: Vec<usize> =
             (0..self.images).filter(|&k| running.iter().all(|one| one.contradictions[k].is_some())).collect();
         let sum = |one: &Contender| one.price() * compared.iter().filter_map(|&k| one.contradictions[k]).sum::<f64>();
         // Of equals the first, which is what was given.
         let best = running.into_iter().min_by(|a, b| sum(a).total_cmp(&sum(b)));
-        best.or_else(|| self.filters.get(1))?.doubt.clone()
+        best.or_else(|| self.filters.iter().skip(1).find(|one| !one.by_gravity))?.doubt.clone()
     }
 }
 
@@ -106,8 +118,8 @@ impl Contender {
     /// Factor on the contradiction.
     fn price(&self) -> f64 {
         let parts = self.doubt.as_ref().map_or(&[][..], |doubt| &doubt.parts);
-        let accelerometer = if parts.contains(&CalibrationPart::Accelerometer) { ACCELEROMETER } else { 0.0 };
-        1.0 + PART * parts.len() as f64 + accelerometer
+        let is_free = self.by_gravity || !parts.contains(&CalibrationPart::Accelerometer);
+        1.0 + PART * parts.len() as f64 + if is_free { 0.0 } else { ACCELEROMETER }
     }
 
     fn followed(&self) -> usize {
@@ -132,42 +144,82 @@ fn corrected(given: &Vio, doubt: &CalibrationDoubt) -> Option<Vio> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Matrix3, Vector3};
+
     use super::*;
     use crate::camera::Camera;
+    use crate::filter::report::Calibration;
     use crate::filter::settings::Settings;
     use crate::run::calibration_doubt::tests::{doubt, found as found_of};
     use crate::samples::ImuNoise;
     use crate::sim::{RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, painting_flight};
 
-    #[test]
-    fn what_serves_worse_is_dropped_and_what_serves_better_stays() {
-        let sound = camera_ahead();
-        let wrong = Camera { fx: 1.02 * sound.fx, fy: 1.02 * sound.fy, ..sound };
+    /// A flight along a wall, with sound samples.
+    fn flight() -> Simulation {
         let room = RoomSettings { texture_size: 512, ..RoomSettings::default() };
-        let cameras = vec![SimulatedCamera { camera: sound, ..SimulatedCamera::default() }];
+        let cameras = vec![SimulatedCamera { camera: camera_ahead(), ..SimulatedCamera::default() }];
         let scenario = Scenario { seed: 6, cameras, room, ..Scenario::default() };
-        let simulation = Simulation::new(painting_flight(6, 10.0).unwrap(), scenario).unwrap();
-        let mut trials = [(sound, wrong), (wrong, sound)].map(|(given, found)| {
-            let vio = Vio::new(given, ImuNoise::default(), Settings::default()).unwrap();
-            CalibrationTrial::new(&vio, vec![doubt(&given, &found_of(found), CalibrationPart::FocalLength)])
-        });
+        Simulation::new(painting_flight(6, 10.0).unwrap(), scenario).unwrap()
+    }
+
+    /// Gives a flight to trials, whose sensors read a force as `read` says.
+    fn follow<const N: usize>(trials: &mut [CalibrationTrial; N], read: [&dyn Fn(Vector3<f64>) -> Vector3<f64>; N]) {
+        let simulation = flight();
         let mut samples = simulation.imu(0).unwrap().samples.into_iter().peekable();
         for index in 0..simulation.frame_count(0) {
             let Some(frame) = simulation.frame(0, index).unwrap() else { continue };
             while let Some(sample) = samples.next_if(|sample| sample.stamp <= frame.stamp) {
-                for trial in &mut trials {
-                    trial.imu(&sample);
+                for (trial, read) in trials.iter_mut().zip(&read) {
+                    trial.imu(&Imu { accel: read(sample.accel), ..sample });
                 }
             }
-            for trial in &mut trials {
+            for trial in trials.iter_mut() {
                 trial.images(frame.stamp, &frame.view(), None);
             }
         }
-        let sums = trials.each_ref().map(|trial| {
-            trial.filters.iter().map(|one| one.contradictions.iter().flatten().sum::<f64>()).collect::<Vec<f64>>()
+    }
+
+    fn sums(trial: &CalibrationTrial) -> Vec<f64> {
+        trial.filters.iter().map(|one| one.contradictions.iter().flatten().sum()).collect()
+    }
+
+    fn vio(camera: Camera) -> Vio {
+        Vio::new(camera, ImuNoise::default(), Settings::default()).unwrap()
+    }
+
+    #[test]
+    fn what_serves_worse_is_dropped_and_what_serves_better_stays() {
+        let sound = camera_ahead();
+        let wrong = Camera { fx: 1.02 * sound.fx, fy: 1.02 * sound.fy, ..sound };
+        let mut trials = [(sound, wrong), (wrong, sound)].map(|(given, found)| {
+            let doubts = vec![doubt(&given, &found_of(found), CalibrationPart::FocalLength)];
+            CalibrationTrial::new(&vio(given), doubts, None)
         });
+        follow(&mut trials, [&|force| force; 2]);
         let [dropped, kept] = trials.each_ref().map(CalibrationTrial::finish);
-        assert_eq!(dropped, None, "{sums:?}");
-        assert!(kept.is_some(), "{sums:?}");
+        assert_eq!(dropped, None, "{:?}", sums(&trials[0]));
+        assert!(kept.is_some(), "{:?}", sums(&trials[1]));
+    }
+
+    /// Gravity is as long to a sensor out of scale as to a biased one: how it moves tells which of them it is.
+    #[test]
+    fn a_scale_by_gravity_stays_where_the_accelerometer_is_out_of_scale() {
+        let given = camera_ahead();
+        let by_gravity = |scale: f64| {
+            let found = Calibration { accel_matrix: Matrix3::identity() * scale, ..found_of(given) };
+            CalibrationTrial::new(&vio(given), Vec::new(), Some(doubt(&given, &found, CalibrationPart::Accelerometer)))
+        };
+        let bias = 0.03 * 9.81 * Vector3::z();
+        let mut trials = [by_gravity(1.0 / 1.03), by_gravity(1.0 / 1.03)];
+        follow(&mut trials, [&|force| 1.03 * force, &|force| force + bias]);
+        let [scaled, biased] = trials.each_ref().map(CalibrationTrial::finish);
+        assert!(scaled.is_some(), "{:?}", sums(&trials[0]));
+        assert_eq!(biased, None, "{:?}", sums(&trials[1]));
+        // Beside a filter that did not start it says nothing, but images do.
+        let [mut trial, _] = trials;
+        trial.filters[0].contradictions.fill(None);
+        assert_eq!(trial.finish(), None);
+        trial.filters[1].by_gravity = false;
+        assert!(trial.finish().is_some());
     }
 }

@@ -4,11 +4,14 @@
 
 use std::collections::VecDeque;
 
+use nalgebra::{DVector, Matrix3};
+
 use crate::filter::calibration_error::CalibrationError;
-use crate::filter::report::Status;
+use crate::filter::report::{Calibration, Status};
 use crate::filter::settings::{CalibrationSettings, Settings};
 use crate::filter::state::error_state;
 use crate::filter::vio::Vio;
+use crate::imu_check::gravity_scale;
 use crate::run::calibration_doubt::{CalibrationDoubt, CalibrationPart, describe};
 use crate::run::calibration_evidence::{conditioned, contradicted};
 use crate::run::calibration_trial::CalibrationTrial;
@@ -26,6 +29,8 @@ const ENOUGH: f64 = 10.0;
 /// The deviations of the posterior are taken to be so many times as large: a filter is never as sure as it says. The floors below are not:
 /// they were measured.
 const CAUTION: f64 = 2.0;
+/// Samples that tell the length of gravity: 100 s at 200 Hz.
+const MOST_SAMPLES: usize = 20_000;
 /// Images that wait at most: 0.4 s at 20 Hz.
 const MOST_WAITING: usize = 8;
 
@@ -58,12 +63,16 @@ const BOTH: [[Part; 2]; 3] = [
     [Part::Distortion, Part::SecondDistortion],
 ];
 
-/// What may be wrong, the most probable last: all of it a little, or the lenses much, or place and clock of the camera. A filter that
-/// is to learn much of everything at once loses its way.
-fn hypotheses(given: &Settings) -> Vec<Settings> {
+/// Filters that know the calibration roughly, the most probable last: all of it may be a little wrong, or the lenses much, or place and
+/// clock of the camera. A filter that is to learn much of everything at once loses its way, and one of two cameras loses it earlier.
+fn hypotheses(vio: &Vio) -> Vec<Vio> {
+    let given = vio.settings();
     let all = given.with_rough_calibration();
     let (lenses, place) = (all.calibration.of_lenses_only(), all.calibration.of_place_only());
-    vec![Settings { calibration: place, ..*given }, Settings { calibration: lenses, ..*given }, all]
+    let rough = [Settings { calibration: place, ..*given }, Settings { calibration: lenses, ..*given }, all];
+    let alone = vio.first_camera_alone();
+    let sensors = alone.iter().chain(std::iter::once(vio));
+    sensors.flat_map(|vio| rough.iter().filter_map(|settings| vio.with_settings(settings).ok())).collect()
 }
 
 /// The second filter.
@@ -74,9 +83,10 @@ pub(super) struct CalibrationWatch {
     stage: Stage,
     order: Option<PairOrder>,
     /// What is tried after a divergence, the last first.
-    remaining: Vec<Settings>,
+    remaining: Vec<Vio>,
     images: usize,
-    latest: Option<Stamp>,
+    /// The latest, in order.
+    samples: VecDeque<Imu>,
     /// Images for which there are no samples yet.
     waiting: VecDeque<(Stamp, Pixels, Option<Pixels>)>,
 }
@@ -114,10 +124,10 @@ impl CalibrationWatch {
             return None;
         }
         let order = vio.camera_pair().map(|cameras| PairOrder::new(cameras, given));
-        let mut remaining = hypotheses(given);
-        let stage = Stage::Search(vio.with_settings(&remaining.pop()?).ok()?);
+        let mut remaining = hypotheses(vio);
+        let stage = Stage::Search(remaining.pop()?);
         let given = vio.with_settings(given).ok()?;
-        Some(Self { given, stage, order, remaining, images: 0, latest: None, waiting: VecDeque::new() })
+        Some(Self { given, stage, order, remaining, images: 0, samples: VecDeque::new(), waiting: VecDeque::new() })
     }
 
     pub(super) fn imu(&mut self, sample: &Imu) {
@@ -126,7 +136,14 @@ impl CalibrationWatch {
             Stage::Search(vio) => drop(vio.imu(sample)),
             Stage::Trial(trial) => trial.imu(sample),
         }
-        self.latest = Some(sample.stamp);
+        if self.samples.len() == MOST_SAMPLES {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(*sample);
+    }
+
+    fn latest(&self) -> Option<Stamp> {
+        self.samples.back().map(|sample| sample.stamp)
     }
 
     /// Takes the images of a time; what it finds once it has seen enough, after which it is not needed any more. By its own idea of the
@@ -141,7 +158,7 @@ impl CalibrationWatch {
         self.waiting.push_back((stamp, owned(first), second.map(owned)));
         while let Some((stamp, ..)) = self.waiting.front() {
             let time = stamp.plus_secs(self.time_offset_s());
-            if self.latest.is_none_or(|latest| latest < time) && self.waiting.len() < MOST_WAITING {
+            if self.latest().is_none_or(|latest| latest < time) && self.waiting.len() < MOST_WAITING {
                 break;
             }
             let Some((stamp, first, second)) = self.waiting.pop_front() else { break };
@@ -177,18 +194,15 @@ impl CalibrationWatch {
             Stage::Trial(trial) => return trial.images(stamp, first, second).then(|| trial.finish()),
         };
         let given = match second {
-            Some(second) => vio.image_pair(stamp, first, second),
-            None => vio.image(stamp, first),
+            Some(second) if vio.second_camera().is_ok() => vio.image_pair(stamp, first, second),
+            _ => vio.image(stamp, first),
         };
         // What it cannot take is told by the first filter.
         let report = given.ok()?;
         match report.status {
             Status::Diverged(_) => {
                 // It must leave the others, too, while it learns.
-                let Some(next) = self.remaining.pop().and_then(|settings| self.given.with_settings(&settings).ok())
-                else {
-                    return Some(None);
-                };
+                let Some(next) = self.remaining.pop() else { return Some(None) };
                 (self.stage, self.images) = (Stage::Search(next), 0);
             }
             Status::Uninitialised(_) => self.images = 0,
@@ -197,11 +211,11 @@ impl CalibrationWatch {
         if self.images < IMAGES {
             return None;
         }
-        let doubts = self.doubts().unwrap_or_default();
-        if doubts.is_empty() {
+        let (doubts, by_gravity) = (self.doubts().unwrap_or_default(), self.by_gravity());
+        if doubts.is_empty() && by_gravity.is_none() {
             return Some(None);
         }
-        self.stage = Stage::Trial(CalibrationTrial::new(&self.given, doubts));
+        self.stage = Stage::Trial(CalibrationTrial::new(&self.given, doubts, by_gravity));
         None
     }
 
@@ -267,6 +281,24 @@ impl CalibrationWatch {
         };
         Some(choices.filter(|free| !free.is_empty()).filter_map(doubt).collect())
     }
+
+    /// The accelerometer, if it does not read gravity as long as it is: out of scale then, or biased, which a filter finds by itself.
+    fn by_gravity(&self) -> Option<CalibrationDoubt> {
+        let Stage::Search(vio) = &self.stage else { return None };
+        let samples: Vec<Imu> = self.samples.iter().copied().collect();
+        let scale = gravity_scale(&samples, self.given.settings().gravity)?;
+        let error = DVector::zeros(vio.calibration_error()?.error.len());
+        let found = Calibration { accel_matrix: Matrix3::identity() * scale, ..vio.calibration_at(&error)? };
+        let words = describe(Part::Accelerometer, &found, &self.given);
+        Some(CalibrationDoubt {
+            parts: vec![Part::Accelerometer],
+            found: Some(found),
+            given_pose: self.given.camera().body_from_camera(),
+            clock_change_s: 0.0,
+            row_time_change_s: 0.0,
+            words,
+        })
+    }
 }
 
 /// What the first thirty seconds of motion of a recording say against the calibration of a filter that has not started: as a
@@ -277,9 +309,8 @@ pub fn check_calibration<P: Picture, F: IntoIterator<Item = RecordedFrame<P>>>(
     frames: impl Fn() -> F,
 ) -> Option<CalibrationDoubt> {
     let watch = CalibrationWatch::beside(vio)?;
-    hypotheses(vio.settings()).iter().rev().find_map(|settings| {
-        let stage = Stage::Search(vio.with_settings(settings).ok()?);
-        let one = CalibrationWatch { stage, remaining: Vec::new(), ..watch.clone() };
+    hypotheses(vio).into_iter().rev().find_map(|vio| {
+        let one = CalibrationWatch { stage: Stage::Search(vio), remaining: Vec::new(), ..watch.clone() };
         one.over(samples, frames())
     })?
 }
@@ -295,7 +326,7 @@ impl CalibrationWatch {
         for RecordedFrame { stamp, picture, second } in frames {
             let Ok(picture) = picture else { continue };
             let time = stamp.plus_secs(self.time_offset_s());
-            while self.latest.is_none_or(|latest| latest < time) {
+            while self.latest().is_none_or(|latest| latest < time) {
                 let Some(sample) = samples.next() else { break };
                 self.imu(sample);
             }
@@ -308,5 +339,26 @@ impl CalibrationWatch {
             }
         }
         (self.images >= FEWEST).then(|| self.finish())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::samples::ImuNoise;
+
+    /// Of a pair: with both cameras first, then with the first of them.
+    #[test]
+    fn a_pair_that_loses_its_way_is_followed_by_its_first_camera() {
+        let (noise, settings) = (ImuNoise::default(), Settings::default());
+        let single = Vio::new(Camera::euroc(), noise, settings).unwrap();
+        let pair = Vio::stereo(Camera::euroc(), Camera::euroc_right(), noise, settings).unwrap();
+        let cameras = |vio: &Vio| -> Vec<usize> {
+            let of = |vio: &Vio| if vio.second_camera().is_ok() { 2 } else { 1 };
+            hypotheses(vio).iter().rev().map(of).collect()
+        };
+        assert_eq!(cameras(&single), [1; 3]);
+        assert_eq!(cameras(&pair), [2, 2, 2, 1, 1, 1]);
     }
 }
