@@ -2,6 +2,7 @@
 
 pub(crate) mod block_mesh;
 mod cell_cases;
+mod components;
 pub(crate) mod deformation;
 mod edge_set;
 pub(crate) mod incremental;

@@ -69,7 +69,7 @@ fn all(arguments: &Arguments) -> Result<(), AnyError> {
         }
     }
     println!(
-        "\n| sequence, voxel | tracked | ATE, cm; aligned | paper; ElasticFusion; InfiniTAM | mesh, mm | paper; ElasticFusion; InfiniTAM | memory, MB; evicted | tracking, fusion, ms |"
+        "\n| sequence, voxel | tracked | ATE, cm; aligned | paper; ElasticFusion; InfiniTAM | mesh; without specks, mm | paper; ElasticFusion; InfiniTAM | memory, MB; evicted | tracking, fusion, ms |"
     );
     println!("|---|---|---|---|---|---|---|---|");
     println!("{}", rows.join("\n"));
@@ -82,7 +82,7 @@ fn row(figures: &Figures, voxel: f64, published: Option<Published>) -> String {
         published.map_or_else(|| "-".to_owned(), |published| of(&published).map(cell).join("; "))
     };
     format!(
-        "| {}, {} cm | {} of {} | {:.2}; {:.2} | {} | {:.2} ± {:.2} | {} | {:.0}; {:.0} | {:.0}, {:.0} |",
+        "| {}, {} cm | {} of {} | {:.2}; {:.2} | {} | {:.2} ± {:.2}; {:.2} ± {:.2} | {} | {:.0}; {:.0} | {:.0}, {:.0} |",
         figures.sequence,
         100.0 * voxel,
         figures.tracked,
@@ -92,6 +92,8 @@ fn row(figures: &Figures, voxel: f64, published: Option<Published>) -> String {
         cells(|published| published.tracking),
         1e3 * figures.mesh_mean_m,
         1e3 * figures.mesh_deviation_m,
+        1e3 * figures.mesh_without_specks_m[0],
+        1e3 * figures.mesh_without_specks_m[1],
         cells(|published| published.mesh),
         figures.active_bytes as f64 / 1e6,
         figures.evicted_bytes as f64 / 1e6,

@@ -4,6 +4,7 @@ use cpu_time::ThreadTime;
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::Serialize;
 use tsdf_hash::loop_closure::LoopSettings;
+use tsdf_hash::mesh::Mesh;
 use tsdf_hash::slam::{Event, FrameImages, Slam, SlamSettings, SlamState};
 use tsdf_hash::storage::MemoryLimits;
 use tsdf_hash::{Map, Settings};
@@ -20,6 +21,8 @@ const GYROSCOPE_BIAS: [f64; 3] = [0.01, -0.008, 0.005];
 
 /// Images from one line of progress to the next.
 const PROGRESS_EVERY: usize = 100;
+/// Connected components of the mesh with fewer triangles are specks (ours).
+const LEAST_TRIANGLES: usize = 36;
 
 type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
@@ -66,8 +69,12 @@ pub struct Figures {
     pub mesh_deviation_m: f64,
     /// The median.
     pub mesh_median_m: f64,
+    /// Mean and deviation without connected components of fewer than 36 triangles.
+    pub mesh_without_specks_m: [f64; 2],
     /// Vertices of the mesh.
     pub vertices: usize,
+    /// The same without those components.
+    pub vertices_without_specks: usize,
     /// Most bytes of active memory.
     pub active_bytes: usize,
     /// Most bytes that were evicted.
@@ -121,18 +128,15 @@ pub fn run(sequence: &Sequence, limits: &Limits, see: See) -> Result<Figures, An
     // A loop at the end is still to reach the map.
     while slam.reintegrate(usize::MAX)? > 0 {}
     let (truth, found): (Vec<_>, Vec<_>) = slam.frames().map(|(frame, pose)| (rendered.pose(frame), pose)).unzip();
-    let mut off: Vec<f64> = slam
-        .finish()?
-        .map
-        .consolidated()?
-        .mesh()
-        .positions
-        .iter()
-        .map(|vertex| rendered.world.distance(&Point3::from(vertex.map(f64::from))).abs())
-        .collect();
-    off.sort_unstable_by(f64::total_cmp);
-    let mean = off.iter().sum::<f64>() / off.len().max(1) as f64;
-    let variance = off.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / off.len().max(1) as f64;
+    let mesh = slam.finish()?.map.consolidated()?.mesh();
+    let off = |mesh: &Mesh| -> Vec<f64> {
+        let place = |vertex: &[f32; 3]| Point3::from(vertex.map(f64::from));
+        let mut off: Vec<f64> =
+            mesh.positions.iter().map(|vertex| rendered.world.distance(&place(vertex)).abs()).collect();
+        off.sort_unstable_by(f64::total_cmp);
+        off
+    };
+    let (all, parts) = (off(&mesh), off(&mesh.without_small_components(LEAST_TRIANGLES)));
     let steps = 1..frames;
     let step = |k: usize| (rendered.pose(k).translation.vector - rendered.pose(k - 1).translation.vector).norm();
     Ok(Figures {
@@ -144,10 +148,12 @@ pub fn run(sequence: &Sequence, limits: &Limits, see: See) -> Result<Figures, An
         path_m: steps.map(step).sum(),
         ate_m: ate(&truth, &found, Alignment::None)?.position.rmse,
         ate_se3_m: ate(&truth, &found, Alignment::Se3)?.position.rmse,
-        mesh_mean_m: mean,
-        mesh_deviation_m: variance.sqrt(),
-        mesh_median_m: off.get(off.len() / 2).copied().unwrap_or_default(),
-        vertices: off.len(),
+        mesh_mean_m: mean(&all),
+        mesh_deviation_m: deviation(&all),
+        mesh_median_m: all.get(all.len() / 2).copied().unwrap_or_default(),
+        mesh_without_specks_m: [mean(&parts), deviation(&parts)],
+        vertices: all.len(),
+        vertices_without_specks: parts.len(),
         active_bytes: statistics.active_bytes_peak,
         evicted_bytes: statistics.host_bytes_peak,
         tracking_s: median(tracking),
@@ -189,6 +195,15 @@ impl Readings {
         }
         readings
     }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+fn deviation(values: &[f64]) -> f64 {
+    let mean = mean(values);
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

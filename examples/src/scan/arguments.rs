@@ -129,6 +129,9 @@ pub struct Arguments {
     /// Frames that share one ray cast of the map to be tracked against; those between see it from where they are
     #[arg(long, value_name = "FRAMES", default_value_t = 1, value_parser = parse_frames)]
     pub(super) model_every: usize,
+    /// Leave connected components of fewer triangles out of the mesh: specks that single readings left; 0: none, and thin things stay whole
+    #[arg(long, value_name = "TRIANGLES", default_value_t = 0)]
+    pub(super) least_triangles: usize,
     /// What keeps the map
     #[arg(long, default_value = "auto")]
     pub(super) device: DeviceName,
@@ -276,7 +279,7 @@ pub(super) fn settings(arguments: &Arguments) -> Result<ScanSettings, String> {
     let fuse = relocalise.is_none() || arguments.extend;
     let loops = arguments.loops.then(LoopSettings::default);
     let checkpoint = checkpoint.filter(|_| fuse);
-    let model_every = arguments.model_every;
+    let (model_every, least_triangles) = (arguments.model_every, arguments.least_triangles);
     let slam = SlamSettings { map, poses, device, fuse, loops, model_every, ..SlamSettings::default() };
-    Ok(ScanSettings { slam, swap, resume, relocalise, checkpoint, live, ..ScanSettings::default() })
+    Ok(ScanSettings { slam, swap, resume, relocalise, checkpoint, least_triangles, live, ..ScanSettings::default() })
 }

@@ -253,7 +253,10 @@ impl<'a> Run<'a> {
         self.live.take().map_or(Ok(()), Live::close)?;
         let stage = Stage::start("mesh");
         let start = ProcessTime::now();
-        let mesh = self.slam.map().dense().mesh()?;
+        let mut mesh = self.slam.map().dense().mesh()?;
+        if self.settings.least_triangles > 0 {
+            mesh = mesh.without_small_components(self.settings.least_triangles);
+        }
         self.metrics.mesh_s = start.elapsed().as_secs_f64();
         stage.done(&format!("{} vertices, {} triangles", mesh.positions.len(), mesh.faces.len()));
         let Self { sequence, settings, slam, resumed, skipped, mut metrics, .. } = self;

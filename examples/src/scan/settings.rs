@@ -24,6 +24,8 @@ pub struct ScanSettings {
     pub relocalise: Option<PathBuf>,
     /// Where the map is saved on the way.
     pub checkpoint: Option<CheckpointSettings>,
+    /// Connected components of the mesh with fewer triangles are left out.
+    pub least_triangles: usize,
     /// Who is told how it goes.
     pub live: LiveSettings,
 }
@@ -37,6 +39,7 @@ impl Default for ScanSettings {
             resume: None,
             relocalise: None,
             checkpoint: None,
+            least_triangles: 0,
             live: LiveSettings::default(),
         }
     }

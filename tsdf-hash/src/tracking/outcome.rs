@@ -91,7 +91,8 @@ pub struct TrackingOutcome {
     pub covariance: Matrix6<f64>,
     /// Unit directions of `(mean depth · ω, v)` along which the frame says nothing; empty if it fixes the pose.
     pub degenerate: Vec<Vector6<f64>>,
-    /// Share of the model's points for which the frame has a measurement.
+    /// Share of the model's points for which the frame has a measurement: of depth, or of colour where it has none, as beyond the reach of
+    /// the depth camera; of colour alone twice as many as of depth count at most.
     pub overlap: f64,
     /// Share of the frame's measurements that the model accounts for, about: where it is small, the rest of the frame has no say.
     pub coverage: f64,

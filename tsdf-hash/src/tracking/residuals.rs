@@ -15,6 +15,8 @@ const HUBER: f32 = 1.345;
 const OUTLIER: f32 = HUBER * (10.0 - 0.5 * HUBER);
 /// Tiles with fewer distances say nothing about what is shared.
 const LEAST_TERMS: u32 = 16;
+/// Points that are compared in colour alone count for so many that are in depth (ours).
+const COLOUR_PER_DEPTH: u32 = 2;
 /// Depth residuals are counted up to so many standard deviations of the noise model.
 const MOST_DEVIATIONS: f32 = 32.0;
 /// Intensity residuals are counted up to so many grey levels.
@@ -59,6 +61,8 @@ pub(crate) struct Evaluation {
     pub(crate) cost: [f64; 2],
     /// Points of the model that are in the image, in front of nothing nearer.
     pub(crate) in_view: u32,
+    /// Points in the image where no depth was measured and there is a colour.
+    pub(crate) in_colour: u32,
     /// Those with a partner.
     pub(crate) partners: u32,
     /// Those that agree with it.
@@ -79,6 +83,7 @@ impl Evaluation {
             equations: NormalEquations::zero(),
             cost: [0.0; 2],
             in_view: 0,
+            in_colour: 0,
             partners: 0,
             agreeing: 0,
             tiles: [0.0; 2],
@@ -93,6 +98,7 @@ impl Evaluation {
         self.equations.add(&other.equations);
         (0..2).for_each(|k| self.cost[k] += other.cost[k]);
         self.in_view += other.in_view;
+        self.in_colour += other.in_colour;
         self.partners += other.partners;
         self.agreeing += other.agreeing;
         (0..2).for_each(|k| self.tiles[k] += other.tiles[k]);
@@ -109,6 +115,11 @@ impl Evaluation {
         let outliers = f64::from(OUTLIER) * f64::from(self.in_view - self.partners);
         let distance = (self.cost[0] + outliers) / f64::from(self.in_view.max(1));
         distance + share * self.cost[1] / f64::from(self.intensity.total.max(1))
+    }
+
+    /// Points that are compared with the frame: in depth, and in colour where there is none, as far as depth bears it out.
+    pub(crate) fn compared(&self) -> u32 {
+        self.in_view + self.in_colour.min(COLOUR_PER_DEPTH * self.in_view)
     }
 
     /// Terms of intensity to one of distance.
@@ -219,8 +230,13 @@ impl<'a> Task<'a> {
         }
         let at = j * level.width + i;
         let omega = level.omega[at];
+        let coloured = self.of.photometric && !point.intensity.is_nan();
         if omega <= 0.0 {
-            // Not measured: no word for or against.
+            // Not measured: no word for or against the surface, but what is there has a colour.
+            if coloured {
+                all.in_colour += 1;
+                self.add_intensity(point, arm, [x, y, inverse, u, v], intensities, sums, all);
+            }
             return;
         }
         all.in_view += 1;
@@ -257,7 +273,7 @@ impl<'a> Task<'a> {
         let turn = cross(measured, normal);
         distances.add([turn[0], turn[1], turn[2], normal[0], normal[1], normal[2]], residual, weight, 1.0);
 
-        if self.of.photometric && !point.intensity.is_nan() {
+        if coloured {
             self.add_intensity(point, arm, [x, y, inverse, u, v], intensities, sums, all);
         }
     }

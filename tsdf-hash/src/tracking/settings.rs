@@ -15,7 +15,7 @@ pub struct TrackingSettings {
     pub max_distance: f64,
     /// Whether intensities take part, where there is colour (Eq. (5.3)).
     pub photometric: bool,
-    /// Least share of the model's points that must be measured (ours: 0.3); below it the camera is lost.
+    /// Least [overlap](crate::tracking::TrackingOutcome::overlap) (ours: 0.3); below it the camera is lost.
     pub min_overlap: f64,
     /// Least share of those that must agree with the model, within three standard deviations and half a voxel (ours: 0.5);
     /// below it the camera is lost.

@@ -323,7 +323,7 @@ impl Tracker {
     ) -> TrackingOutcome {
         let share = |part: u32, whole: u32| f64::from(part) / f64::from(whole.max(1));
         let points = self.models[0].points.len() as u32;
-        let (overlap, agreement) = (share(last.in_view, points), share(last.agreeing, last.in_view));
+        let (overlap, agreement) = (share(last.compared(), points), share(last.agreeing, last.in_view));
         // The model has one point for so many pixels.
         let cell = (FINE_STRIDE * FINE_STRIDE) as f64;
         let measured = comparison.level.omega.iter().filter(|omega| **omega > 0.0).count();
@@ -337,7 +337,7 @@ impl Tracker {
         let Some(Observed { last, directions, unknown }) = found else {
             return TrackingOutcome { overlap, coverage, agreement, ..lost(prior, TrackingStatus::NoOverlap) };
         };
-        let (overlap, agreement) = (share(last.in_view, points), share(last.agreeing, last.in_view));
+        let (overlap, agreement) = (share(last.compared(), points), share(last.agreeing, last.in_view));
         // Along what the frame does not fix, back to the prior, if it is more than a guess.
         if prior.covariance.is_some() {
             let wandered = directions.part(&step(&search.pose, &prior.world_from_camera), |k| unknown[k]);

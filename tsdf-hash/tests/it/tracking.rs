@@ -150,6 +150,38 @@ fn texture_fixes_what_a_wall_does_not() {
 }
 
 #[test]
+fn what_has_no_depth_is_followed_by_its_colour() {
+    // A wall of which the frame has the depth of one side only, where it is of one grey.
+    let pose = look_at(Point3::new(0.0, 0.0, 0.0), Point3::new(1.0, 0.3, 0.2));
+    let wall = |o: &Point3<f64>, d: &Vector3<f64>| Some((1.5 - o.x) / d.x);
+    let whole = Shot::take((320, 240), [262.5; 2], pose, wall);
+    let left_of = |column: usize| {
+        let depth = whole.depth.iter().enumerate().map(|(at, &z)| if at % 320 < column { z } else { 0.0 });
+        Shot { depth: depth.collect(), ..whole.clone() }
+    };
+    let edge = whole.world_from_camera * Point3::new((80.0 - 159.5) / 262.5 * 1.5, 0.0, 1.5);
+    let painted = whole.clone().painted(|p| {
+        let waves = 60.0 * (20.0 * p.y + 1.0).sin() + 50.0 * (17.0 * p.z + 4.0 * p.y).sin();
+        [if p.y > edge.y { 128 } else { (128.0 + waves) as u8 }; 3]
+    });
+    let mut map = Map::new(Settings { voxel_size: 0.01, ..Settings::default() }).unwrap();
+    map.integrate(&whole.view(), painted.colour().as_ref(), &pose).unwrap();
+    let shift = Vector3::new(0.005, 0.008, -0.006);
+    let off = Isometry3::from_parts((pose.translation.vector + shift).into(), pose.rotation);
+    let mut track = |columns: usize, colour: bool| {
+        let colour = painted.colour().filter(|_| colour);
+        tracker().track(&mut map, &left_of(columns).view(), colour.as_ref(), &prior(off)).unwrap()
+    };
+    let outcome = track(80, true);
+    let (metres, radians) = apart(&outcome.world_from_camera, &pose);
+    assert!(outcome.is_tracked() && outcome.degenerate.is_empty(), "{outcome:?}");
+    assert!(metres < 1e-3 && radians < 1e-3, "{metres} m, {radians} rad");
+    // Nothing holds a quarter of a wall without colour, and colour holds nothing that hardly any depth bears out.
+    assert_eq!(track(80, false).status, TrackingStatus::NoOverlap);
+    assert_eq!(track(20, true).status, TrackingStatus::NoOverlap);
+}
+
+#[test]
 fn a_camera_that_is_lost_says_so() {
     let shots = room::tour(60, 2, &Isometry3::identity());
     let mut map = map_of(&shots[..5], 0.02);
