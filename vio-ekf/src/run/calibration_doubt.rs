@@ -55,6 +55,8 @@ pub struct CalibrationDoubt {
     pub parts: Vec<CalibrationPart>,
     /// What was found of these parts with the others as they were given; `None` where the images alone tell.
     pub found: Option<Calibration>,
+    /// Whether the length of gravity has raised it, not images.
+    pub(super) by_gravity: bool,
     /// Pose of the first camera on the body of the filter, as it was given.
     pub(super) given_pose: Isometry3<f64>,
     /// What has to be added to the offset of the camera's clock, s.
@@ -94,6 +96,8 @@ impl CalibrationDoubt {
                 Part::CameraAttitude => calibration.camera_attitude_sigma = near.camera_attitude_sigma,
                 Part::CameraPosition => calibration.camera_position_sigma_m = near.camera_position_sigma_m,
                 Part::Clock => calibration.time_offset_sigma_s = near.time_offset_sigma_s,
+                // A mean force is gravity to a percent or two, which is what a filter allows for by itself.
+                Part::Accelerometer if self.by_gravity => {}
                 Part::Accelerometer => {
                     freed.imu.accel_matrix = AccelMatrixEstimation::Always;
                     freed.imu.accel_scale_sigma = 0.1 * rough.accel_scale_sigma;
@@ -268,6 +272,7 @@ pub(super) mod tests {
         CalibrationDoubt {
             parts: vec![part],
             found: Some(*found),
+            by_gravity: false,
             given_pose,
             clock_change_s: 0.0,
             row_time_change_s: 0.0,
@@ -314,5 +319,9 @@ pub(super) mod tests {
         assert_eq!(CalibrationSettings { focal_sigma: 0.003, ..focal }, expected);
         assert_eq!(freed(Part::Gyroscope).calibration, settings.calibration);
         assert!(freed(Part::Gyroscope).imu.gyro_scale_sigma > 0.0);
+        // What images have found of the accelerometer is near; what gravity says is not that exact.
+        assert_eq!(freed(Part::Accelerometer).imu.accel_matrix, AccelMatrixEstimation::Always);
+        let by_images = doubt(&Camera::euroc(), &found(Camera::euroc()), Part::Accelerometer);
+        assert_eq!(CalibrationDoubt { by_gravity: true, ..by_images }.freed(&settings), settings);
     }
 }

@@ -32,8 +32,6 @@ pub(super) struct CalibrationTrial {
 #[derive(Debug, Clone)]
 struct Contender {
     doubt: Option<CalibrationDoubt>,
-    /// Whether gravity's length has raised it, not images.
-    by_gravity: bool,
     vio: Vio,
     has_diverged: bool,
     /// Contradiction by image; `None` for those that it did not follow.
@@ -41,19 +39,11 @@ struct Contender {
 }
 
 impl CalibrationTrial {
-    /// `given` has not started; the doubts are those of images, and that of gravity's length. What cannot be put in place of what was
-    /// given is left out.
-    pub(super) fn new(given: &Vio, doubts: Vec<CalibrationDoubt>, by_gravity: Option<CalibrationDoubt>) -> Self {
-        let doubts = doubts.into_iter().map(|doubt| (doubt, false)).chain(by_gravity.map(|doubt| (doubt, true)));
-        let found = doubts.filter_map(|(doubt, by_gravity)| Some((corrected(given, &doubt)?, Some(doubt), by_gravity)));
-        let all = std::iter::once((given.clone(), None, false)).chain(found);
-        let contender = |(vio, doubt, by_gravity)| Contender {
-            doubt,
-            by_gravity,
-            vio,
-            has_diverged: false,
-            contradictions: Vec::new(),
-        };
+    /// `given` has not started. What cannot be put in place of what was given is left out.
+    pub(super) fn new(given: &Vio, doubts: Vec<CalibrationDoubt>) -> Self {
+        let found = doubts.into_iter().filter_map(|doubt| Some((corrected(given, &doubt)?, Some(doubt))));
+        let all = std::iter::once((given.clone(), None)).chain(found);
+        let contender = |(vio, doubt)| Contender { doubt, vio, has_diverged: false, contradictions: Vec::new() };
         Self { filters: all.map(contender).collect(), images: 0 }
     }
 
@@ -84,19 +74,21 @@ impl CalibrationTrial {
     }
 
     /// What is left of the doubt; all of it where too little was seen, or nothing serves. A calibration with which a filter does not start,
-    /// or not for long, where another does, is out. Gravity alone does not decide: a biased accelerometer, too, may not start in flight.
+    /// or not for long, where another does, is out. There gravity alone does not decide, as a biased accelerometer may not start in flight
+    /// either, unless images doubt the accelerometer, too.
     pub(super) fn finish(&self) -> Option<CalibrationDoubt> {
         let most = self.filters.iter().map(Contender::followed).max().unwrap_or(0);
         let serves = |one: &&Contender| most >= FEWEST && !one.has_diverged && 2 * one.followed() > most;
-        let given_serves = self.filters.first().is_some_and(|given| serves(&given));
-        let may_win = |one: &&Contender| serves(one) && (given_serves || !one.by_gravity);
+        let bears_out = |one: &Contender| serves(&one) && (one.doubt.is_none() || one.doubts_accelerometer());
+        let is_borne_out = self.filters.iter().any(|one| !one.by_gravity() && bears_out(one));
+        let may_win = |one: &&Contender| serves(one) && (is_borne_out || !one.by_gravity());
         let running: Vec<&Contender> = self.filters.iter().filter(may_win).collect();
         let compared: Vec<usize> =
             (0..self.images).filter(|&k| running.iter().all(|one| one.contradictions[k].is_some())).collect();
         let sum = |one: &Contender| one.price() * compared.iter().filter_map(|&k| one.contradictions[k]).sum::<f64>();
         // Of equals the first, which is what was given.
         let best = running.into_iter().min_by(|a, b| sum(a).total_cmp(&sum(b)));
-        best.or_else(|| self.filters.iter().skip(1).find(|one| !one.by_gravity))?.doubt.clone()
+        best.or_else(|| self.filters.iter().skip(1).find(|one| !one.by_gravity()))?.doubt.clone()
     }
 }
 
@@ -117,9 +109,17 @@ impl Contender {
 
     /// Factor on the contradiction.
     fn price(&self) -> f64 {
-        let parts = self.doubt.as_ref().map_or(&[][..], |doubt| &doubt.parts);
-        let is_free = self.by_gravity || !parts.contains(&CalibrationPart::Accelerometer);
-        1.0 + PART * parts.len() as f64 + if is_free { 0.0 } else { ACCELEROMETER }
+        let parts = self.doubt.as_ref().map_or(0, |doubt| doubt.parts.len());
+        let accelerometer = if self.doubts_accelerometer() && !self.by_gravity() { ACCELEROMETER } else { 0.0 };
+        1.0 + PART * parts as f64 + accelerometer
+    }
+
+    fn doubts_accelerometer(&self) -> bool {
+        self.doubt.as_ref().is_some_and(|doubt| doubt.parts.contains(&CalibrationPart::Accelerometer))
+    }
+
+    fn by_gravity(&self) -> bool {
+        self.doubt.as_ref().is_some_and(|doubt| doubt.by_gravity)
     }
 
     fn followed(&self) -> usize {
@@ -193,7 +193,7 @@ mod tests {
         let wrong = Camera { fx: 1.02 * sound.fx, fy: 1.02 * sound.fy, ..sound };
         let mut trials = [(sound, wrong), (wrong, sound)].map(|(given, found)| {
             let doubts = vec![doubt(&given, &found_of(found), CalibrationPart::FocalLength)];
-            CalibrationTrial::new(&vio(given), doubts, None)
+            CalibrationTrial::new(&vio(given), doubts)
         });
         follow(&mut trials, [&|force| force; 2]);
         let [dropped, kept] = trials.each_ref().map(CalibrationTrial::finish);
@@ -207,7 +207,8 @@ mod tests {
         let given = camera_ahead();
         let by_gravity = |scale: f64| {
             let found = Calibration { accel_matrix: Matrix3::identity() * scale, ..found_of(given) };
-            CalibrationTrial::new(&vio(given), Vec::new(), Some(doubt(&given, &found, CalibrationPart::Accelerometer)))
+            let doubt = doubt(&given, &found, CalibrationPart::Accelerometer);
+            CalibrationTrial::new(&vio(given), vec![CalibrationDoubt { by_gravity: true, ..doubt }])
         };
         let bias = 0.03 * 9.81 * Vector3::z();
         let mut trials = [by_gravity(1.0 / 1.03), by_gravity(1.0 / 1.03)];
@@ -219,7 +220,7 @@ mod tests {
         let [mut trial, _] = trials;
         trial.filters[0].contradictions.fill(None);
         assert_eq!(trial.finish(), None);
-        trial.filters[1].by_gravity = false;
+        trial.filters[1].doubt.as_mut().unwrap().by_gravity = false;
         assert!(trial.finish().is_some());
     }
 }

@@ -186,8 +186,15 @@ impl CalibrationWatch {
             );
             let (parts, given_pose) = (vec![Part::CameraOrder], self.given.camera().body_from_camera());
             let (clock_change_s, row_time_change_s) = (0.0, 0.0);
-            let doubt = CalibrationDoubt { parts, found: None, given_pose, clock_change_s, row_time_change_s, words };
-            return Some(Some(doubt));
+            return Some(Some(CalibrationDoubt {
+                parts,
+                found: None,
+                by_gravity: false,
+                given_pose,
+                clock_change_s,
+                row_time_change_s,
+                words,
+            }));
         }
         let vio = match &mut self.stage {
             Stage::Search(vio) => vio,
@@ -211,11 +218,12 @@ impl CalibrationWatch {
         if self.images < IMAGES {
             return None;
         }
-        let (doubts, by_gravity) = (self.doubts().unwrap_or_default(), self.by_gravity());
-        if doubts.is_empty() && by_gravity.is_none() {
+        let mut doubts = self.doubts().unwrap_or_default();
+        doubts.extend(self.by_gravity());
+        if doubts.is_empty() {
             return Some(None);
         }
-        self.stage = Stage::Trial(CalibrationTrial::new(&self.given, doubts, by_gravity));
+        self.stage = Stage::Trial(CalibrationTrial::new(&self.given, doubts));
         None
     }
 
@@ -273,6 +281,7 @@ impl CalibrationWatch {
             Some(CalibrationDoubt {
                 parts,
                 found: Some(calibration),
+                by_gravity: false,
                 given_pose: self.given.camera().body_from_camera(),
                 clock_change_s: error[error_state::TIME_OFFSET],
                 row_time_change_s: error[error_state::ROW_TIME],
@@ -293,6 +302,7 @@ impl CalibrationWatch {
         Some(CalibrationDoubt {
             parts: vec![Part::Accelerometer],
             found: Some(found),
+            by_gravity: true,
             given_pose: self.given.camera().body_from_camera(),
             clock_change_s: 0.0,
             row_time_change_s: 0.0,
