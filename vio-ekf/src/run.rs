@@ -1,5 +1,6 @@
 //! The odometry's protocol around the filter: when it starts, when poses are withdrawn, when a new segment begins, and why.
 
+mod calibration_check;
 mod calibration_doubt;
 mod calibration_evidence;
 mod calibration_trial;
@@ -13,8 +14,9 @@ mod runner;
 mod segments;
 mod summary;
 
+pub use calibration_check::check_calibration;
 pub use calibration_doubt::{CalibrationDoubt, CalibrationPart};
-pub use calibration_watch::check_calibration;
+
 pub use evaluation::{AlignedPair, GroundTruth, PoseError, RunEvaluation, evaluate_run};
 pub use frames::{Picture, RecordedFrame, pair_by_stamp};
 pub use outcome::{Event, ImageOutcome, Loss, LossReason, SkipReason, SkippedImage};

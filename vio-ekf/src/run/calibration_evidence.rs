@@ -47,6 +47,17 @@ pub(super) fn contradicted(
     free
 }
 
+/// What may be free of the chosen groups: all of them, all but one, one alone, and those of `pairs` that were chosen.
+pub(super) fn choices(chosen: &[usize], pairs: &[Vec<usize>]) -> Vec<Vec<usize>> {
+    let with_least = |least: usize| if chosen.len() >= least { chosen } else { &[] };
+    let all = with_least(1).first().map(|_| chosen.to_vec());
+    let but_one = with_least(2).iter().map(|left_out| chosen.iter().copied().filter(|k| k != left_out).collect());
+    let alone = with_least(3).iter().map(|k| vec![*k]);
+    // Of three, a pair is all but one.
+    let both = pairs.iter().filter(|pair| chosen.len() > 3 && pair.iter().all(|k| chosen.contains(k))).cloned();
+    all.into_iter().chain(but_one).chain(alone).chain(both).collect()
+}
+
 /// An estimate as it would be if all groups but the free ones were known to be as given: `e_f − P_fx P_xx⁻¹ e_x`, and nothing elsewhere.
 pub(super) fn conditioned(
     error: &DVector<f64>,
@@ -106,6 +117,20 @@ mod tests {
         assert_eq!(found(0.3, 0.5).len(), 2);
         // Two deviations are none.
         assert_eq!(found(0.0, 0.02), Vec::<usize>::new());
+    }
+
+    #[test]
+    fn each_choice_is_made_once() {
+        let pairs = [vec![0, 5], vec![1, 6]];
+        let of = |chosen: &[usize]| choices(chosen, &pairs);
+        assert_eq!(of(&[]), Vec::<Vec<usize>>::new());
+        assert_eq!(of(&[5]), [[5]]);
+        assert_eq!(of(&[5, 0]), [vec![5, 0], vec![0], vec![5]]);
+        assert_eq!(of(&[5, 0, 3]), [vec![5, 0, 3], vec![0, 3], vec![5, 3], vec![5, 0], vec![5], vec![0], vec![3]]);
+        let [all, but_one, alone] = [&[5, 0, 3, 1][..], &[0, 3, 1], &[5]];
+        let of_four = of(all);
+        assert_eq!([&of_four[0][..], &of_four[1], &of_four[5]], [all, but_one, alone]);
+        assert_eq!(of_four[9..], [[0, 5]]);
     }
 
     /// Of two unknowns whose sum was measured the second is given: all of the sum is the first's.

@@ -10,8 +10,6 @@ use crate::stamp::Stamp;
 /// Images that each filter follows, and the fewest that are compared where a recording ends before.
 const COMPARED: usize = 200;
 const FEWEST: usize = 50;
-/// Images after which it ends in any case.
-const MOST: usize = 400;
 /// What a part has to take off the contradiction, as a share of it, and the accelerometer besides, whose scale and axes every filter
 /// finds by itself where it has to, unless it reads gravity too long or too short: ours.
 const PART: f64 = 0.03;
@@ -39,12 +37,20 @@ struct Contender {
 }
 
 impl CalibrationTrial {
+    /// Images after which it ends in any case.
+    pub(super) const MOST: usize = 400;
+
     /// `given` has not started. What cannot be put in place of what was given is left out.
     pub(super) fn new(given: &Vio, doubts: Vec<CalibrationDoubt>) -> Self {
         let found = doubts.into_iter().filter_map(|doubt| Some((corrected(given, &doubt)?, Some(doubt))));
         let all = std::iter::once((given.clone(), None)).chain(found);
         let contender = |(vio, doubt)| Contender { doubt, vio, has_diverged: false, contradictions: Vec::new() };
         Self { filters: all.map(contender).collect(), images: 0 }
+    }
+
+    /// What is tried.
+    pub(super) fn doubts(&self) -> Vec<CalibrationDoubt> {
+        self.filters.iter().filter_map(|contender| contender.doubt.clone()).collect()
     }
 
     pub(super) fn imu(&mut self, sample: &Imu) {
@@ -70,7 +76,7 @@ impl CalibrationTrial {
             contender.step(stamp, first, second);
         }
         let is_done = |contender: &Contender| contender.has_diverged || contender.followed() >= COMPARED;
-        self.images >= MOST || self.filters.iter().all(is_done)
+        self.images >= Self::MOST || self.filters.iter().all(is_done)
     }
 
     /// What is left of the doubt; all of it where too little was seen, or nothing serves. A calibration with which a filter does not start,
@@ -107,10 +113,10 @@ impl Contender {
         self.contradictions.push(followed.and_then(|_| Some(self.vio.contradiction()? - before?)));
     }
 
-    /// Factor on the contradiction.
+    /// Factor on the contradiction. What gravity says it says already.
     fn price(&self) -> f64 {
-        let parts = self.doubt.as_ref().map_or(0, |doubt| doubt.parts.len());
-        let accelerometer = if self.doubts_accelerometer() && !self.by_gravity() { ACCELEROMETER } else { 0.0 };
+        let parts = self.doubt.as_ref().filter(|doubt| !doubt.by_gravity).map_or(0, |doubt| doubt.parts.len());
+        let accelerometer = if parts > 0 && self.doubts_accelerometer() { ACCELEROMETER } else { 0.0 };
         1.0 + PART * parts as f64 + accelerometer
     }
 

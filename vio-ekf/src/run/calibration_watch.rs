@@ -13,9 +13,8 @@ use crate::filter::state::error_state;
 use crate::filter::vio::Vio;
 use crate::imu_check::gravity_scale;
 use crate::run::calibration_doubt::{CalibrationDoubt, CalibrationPart, describe};
-use crate::run::calibration_evidence::{conditioned, contradicted};
+use crate::run::calibration_evidence::{choices, conditioned, contradicted};
 use crate::run::calibration_trial::CalibrationTrial;
-use crate::run::frames::{Picture, RecordedFrame};
 use crate::run::pair_order::PairOrder;
 use crate::samples::{ImageView, Imu};
 use crate::stamp::Stamp;
@@ -63,16 +62,20 @@ const BOTH: [[Part; 2]; 3] = [
     [Part::Distortion, Part::SecondDistortion],
 ];
 
-/// Filters that know the calibration roughly, the most probable last: all of it may be a little wrong, or the lenses much, or place and
-/// clock of the camera. A filter that is to learn much of everything at once loses its way, and one of two cameras loses it earlier.
-fn hypotheses(vio: &Vio) -> Vec<Vio> {
+/// Filters that know the calibration roughly, the most probable first: all of it may be a little wrong, or the lenses much, or place and
+/// clock of the camera. A filter that is to learn much of everything at once loses its way.
+pub(super) fn hypotheses(vio: &Vio) -> Vec<Vio> {
     let given = vio.settings();
     let all = given.with_rough_calibration();
     let (lenses, place) = (all.calibration.of_lenses_only(), all.calibration.of_place_only());
-    let rough = [Settings { calibration: place, ..*given }, Settings { calibration: lenses, ..*given }, all];
+    let rough = [all, Settings { calibration: lenses, ..*given }, Settings { calibration: place, ..*given }];
+    rough.iter().filter_map(|settings| vio.with_settings(settings).ok()).collect()
+}
+
+/// The same, and then those of the first of two cameras: two lose their way earlier.
+fn hypotheses_of_both(vio: &Vio) -> Vec<Vio> {
     let alone = vio.first_camera_alone();
-    let sensors = alone.iter().chain(std::iter::once(vio));
-    sensors.flat_map(|vio| rough.iter().filter_map(|settings| vio.with_settings(settings).ok())).collect()
+    std::iter::once(vio).chain(&alone).flat_map(hypotheses).collect()
 }
 
 /// The second filter.
@@ -124,7 +127,8 @@ impl CalibrationWatch {
             return None;
         }
         let order = vio.camera_pair().map(|cameras| PairOrder::new(cameras, given));
-        let mut remaining = hypotheses(vio);
+        let mut remaining = hypotheses_of_both(vio);
+        remaining.reverse();
         let stage = Stage::Search(remaining.pop()?);
         let given = vio.with_settings(given).ok()?;
         Some(Self { given, stage, order, remaining, images: 0, samples: VecDeque::new(), waiting: VecDeque::new() })
@@ -142,7 +146,8 @@ impl CalibrationWatch {
         self.samples.push_back(*sample);
     }
 
-    fn latest(&self) -> Option<Stamp> {
+    /// Stamp of the latest sample.
+    pub(super) fn latest(&self) -> Option<Stamp> {
         self.samples.back().map(|sample| sample.stamp)
     }
 
@@ -223,33 +228,29 @@ impl CalibrationWatch {
         if doubts.is_empty() {
             return Some(None);
         }
-        self.stage = Stage::Trial(CalibrationTrial::new(&self.given, doubts));
+        self.try_out(doubts);
         None
     }
 
     /// The offset of the camera's clock as far as it is known now.
-    fn time_offset_s(&self) -> f64 {
+    pub(super) fn time_offset_s(&self) -> f64 {
         match &self.stage {
             Stage::Search(vio) => vio.time_offset_s(),
             Stage::Trial(trial) => trial.time_offset_s(),
         }
     }
 
-    fn has_diverged(&self) -> bool {
-        matches!(&self.stage, Stage::Search(vio) if matches!(vio.status(), Status::Diverged(_)))
-    }
-
     /// What it has found so far.
     pub(super) fn finish(&self) -> Option<CalibrationDoubt> {
         match &self.stage {
-            Stage::Search(_) if self.images < FEWEST => None,
+            Stage::Search(_) if !self.has_seen_enough() => None,
             Stage::Search(_) => self.doubts()?.into_iter().next(),
             Stage::Trial(trial) => trial.finish(),
         }
     }
 
-    /// What is doubted, first all of it, then all but one part, then one alone: some of what a filter finds of everything at once is not
-    /// so. Empty where nothing is.
+    /// What is doubted, first all of it, then [less](choices): some of what a filter finds of everything at once is not so. Empty where
+    /// nothing is.
     fn doubts(&self) -> Option<Vec<CalibrationDoubt>> {
         let Stage::Search(vio) = &self.stage else { return None };
         let CalibrationError { error, mut posterior, mut prior } = vio.calibration_error()?;
@@ -266,13 +267,10 @@ impl CalibrationWatch {
         let single = (0..groups.len()).map(|k| vec![k]);
         let both =
             BOTH.iter().filter_map(|both| both.iter().map(|part| named.iter().position(|p| p == part)).collect());
-        let steps: Vec<Vec<usize>> = single.chain(both).collect();
+        let both: Vec<Vec<usize>> = both.collect();
+        let steps: Vec<Vec<usize>> = single.chain(both.iter().cloned()).collect();
         let chosen = contradicted(&error, (&posterior, &prior), (&groups, &steps), ENOUGH);
 
-        let without = |left_out: usize| chosen.iter().copied().filter(|k| *k != left_out).collect::<Vec<usize>>();
-        let many = |least: usize| if chosen.len() >= least { chosen.as_slice() } else { &[] };
-        let fewer = many(2).iter().map(|k| without(*k)).chain(many(3).iter().map(|k| vec![*k]));
-        let choices = std::iter::once(chosen.clone()).chain(fewer);
         let doubt = |free: Vec<usize>| {
             let error = conditioned(&error, &posterior, (&groups, &free))?;
             let calibration = vio.calibration_at(&error)?;
@@ -288,7 +286,7 @@ impl CalibrationWatch {
                 words: words.join("; "),
             })
         };
-        Some(choices.filter(|free| !free.is_empty()).filter_map(doubt).collect())
+        Some(choices(&chosen, &both).into_iter().filter_map(doubt).collect())
     }
 
     /// The accelerometer, if it does not read gravity as long as it is: out of scale then, or biased, which a filter finds by itself.
@@ -311,44 +309,34 @@ impl CalibrationWatch {
     }
 }
 
-/// What the first thirty seconds of motion of a recording say against the calibration of a filter that has not started: as a
-/// [`Runner`](crate::run::Runner) does it beside the filter, by itself. `frames` is asked for the frames anew after a divergence.
-pub fn check_calibration<P: Picture, F: IntoIterator<Item = RecordedFrame<P>>>(
-    vio: &Vio,
-    samples: &[Imu],
-    frames: impl Fn() -> F,
-) -> Option<CalibrationDoubt> {
-    let watch = CalibrationWatch::beside(vio)?;
-    hypotheses(vio).into_iter().rev().find_map(|vio| {
-        let one = CalibrationWatch { stage: Stage::Search(vio), remaining: Vec::new(), ..watch.clone() };
-        one.over(samples, frames())
-    })?
-}
-
+/// What a check of a recording needs besides.
 impl CalibrationWatch {
-    /// What a recording says; `None` where the filter diverges, or sees too little.
-    fn over<P: Picture>(
-        mut self,
-        samples: &[Imu],
-        frames: impl IntoIterator<Item = RecordedFrame<P>>,
-    ) -> Option<Option<CalibrationDoubt>> {
-        let mut samples = samples.iter();
-        for RecordedFrame { stamp, picture, second } in frames {
-            let Ok(picture) = picture else { continue };
-            let time = stamp.plus_secs(self.time_offset_s());
-            while self.latest().is_none_or(|latest| latest < time) {
-                let Some(sample) = samples.next() else { break };
-                self.imu(sample);
-            }
-            let second = second.and_then(Result::ok);
-            let seen = self.images(stamp, &picture.view(), second.as_ref().map(Picture::view).as_ref());
-            match seen {
-                Some(None) if self.has_diverged() => return None,
-                Some(found) => return Some(found),
-                None => {}
-            }
-        }
-        (self.images >= FEWEST).then(|| self.finish())
+    /// The same with one hypothesis alone.
+    pub(super) fn with_hypothesis(&self, vio: Vio) -> Self {
+        Self { stage: Stage::Search(vio), remaining: Vec::new(), ..self.clone() }
+    }
+
+    /// Tries what was found.
+    pub(super) fn try_out(&mut self, doubts: Vec<CalibrationDoubt>) {
+        self.stage = Stage::Trial(CalibrationTrial::new(&self.given, doubts));
+    }
+
+    /// Forgets all that was seen, if something is being tried, and whether it is.
+    pub(super) fn restart_trial(&mut self) -> bool {
+        let Stage::Trial(trial) = &self.stage else { return false };
+        self.try_out(trial.doubts());
+        self.samples.clear();
+        self.waiting.clear();
+        true
+    }
+
+    pub(super) fn has_diverged(&self) -> bool {
+        matches!(&self.stage, Stage::Search(vio) if matches!(vio.status(), Status::Diverged(_)))
+    }
+
+    /// Whether a search has seen enough to be believed.
+    pub(super) fn has_seen_enough(&self) -> bool {
+        self.images >= FEWEST
     }
 }
 
@@ -366,7 +354,7 @@ mod tests {
         let pair = Vio::stereo(Camera::euroc(), Camera::euroc_right(), noise, settings).unwrap();
         let cameras = |vio: &Vio| -> Vec<usize> {
             let of = |vio: &Vio| if vio.second_camera().is_ok() { 2 } else { 1 };
-            hypotheses(vio).iter().rev().map(of).collect()
+            hypotheses_of_both(vio).iter().map(of).collect()
         };
         assert_eq!(cameras(&single), [1; 3]);
         assert_eq!(cameras(&pair), [2, 2, 2, 1, 1, 1]);

@@ -76,6 +76,27 @@ fn a_gyroscope_out_of_scale_is_named_and_put_right() {
     assert!(most < 0.006, "{most}");
 }
 
+/// What is found of a pair's first camera is found without the second.
+#[test]
+fn the_first_of_two_cameras_is_put_right_first() {
+    let (simulation, sound) = (flight(3), camera_ahead());
+    let [left, right] = [0, 1].map(|camera| frames(&simulation, camera, simulation.frame_count(camera)));
+    let samples = simulation.imu(0).unwrap().samples;
+    let checked = |first: Camera| {
+        let vio = Vio::stereo(first, camera_ahead_right(), ImuNoise::default(), Settings::default()).unwrap();
+        let pair = |(left, right): (&Frame, &Frame)| RecordedFrame {
+            stamp: left.stamp,
+            picture: Ok(left.clone()),
+            second: Some(Ok(right.clone())),
+        };
+        check_calibration(&vio, &samples, || left.iter().zip(&right).map(pair))
+    };
+    assert_eq!(checked(sound), None);
+    let doubt = checked(Camera { fx: 1.04 * sound.fx, fy: 1.04 * sound.fy, ..sound }).expect("4 % of focal length");
+    assert_eq!(doubt.parts, [CalibrationPart::FocalLength], "{doubt}");
+    assert!(doubt.found.is_some_and(|found| found.second_camera.is_none()), "{doubt}");
+}
+
 #[test]
 fn exchanged_images_of_two_cameras_are_named() {
     let simulation = flight(4);
