@@ -142,7 +142,7 @@ impl Initializing {
                 _ => (id, direction),
             }
         });
-        let motion = self.dynamic_initializer.image(time, observed, camera.as_ref(), settings.gravity)?;
+        let motion = self.dynamic_initializer.image(time, observed, camera.as_ref(), (&sensors.noise, settings))?;
         let (tracker, pyramid) = (&self.klt_tracker, sensors.frontend.pyramid.clone());
         self.start_in_motion(sensors, time, &motion, |id| {
             let pixel = tracker.pixel(id)?;
@@ -159,7 +159,8 @@ impl Initializing {
     ) -> Option<Running> {
         let (time, camera) = (unsynchronized_time(sensors, stamp), Arc::clone(&sensors.camera));
         let observed = points.iter().filter_map(|p| Some((p.id, camera.bearing(&p.pixel)?.into_inner())));
-        let motion = self.dynamic_initializer.image(time, observed, camera.as_ref(), sensors.settings.gravity)?;
+        let motion =
+            self.dynamic_initializer.image(time, observed, camera.as_ref(), (&sensors.noise, &sensors.settings))?;
         let pixel = |id| points.iter().find(|p| p.id == id).map(|p| (p.pixel, None));
         self.start_in_motion(sensors, time, &motion, pixel)
     }

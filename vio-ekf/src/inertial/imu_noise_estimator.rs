@@ -198,15 +198,22 @@ impl ImuNoiseEstimator {
 impl SampleNoise {
     /// Densities of the white noise between two samples, by axis of gyroscope and accelerometer.
     pub(crate) fn densities(&self, before: &Self, noise: &ImuNoise, settings: &ImuSettings) -> [[f64; 3]; 2] {
-        let density = |k: usize, sheet: f64, range: f64| {
-            let estimated = self.estimated[k].max(before.estimated[k]);
-            let density = if estimated > settings.noise_inflation * sheet { estimated } else { sheet };
+        let larger = [0, 1].map(|k| self.estimated[k].max(before.estimated[k]));
+        let within = Self { estimated: larger, ..*self }.within_range(noise, settings);
+        let density = |k: usize, range: f64| {
             std::array::from_fn(|axis| {
                 let saturated = self.saturated[k][axis] || before.saturated[k][axis];
-                if saturated { range * SATURATED_S.sqrt() } else { density }
+                if saturated { range * SATURATED_S.sqrt() } else { within[k] }
             })
         };
-        [density(0, noise.gyro_density, settings.gyro_range), density(1, noise.accel_density, settings.accel_range)]
+        [density(0, settings.gyro_range), density(1, settings.accel_range)]
+    }
+
+    /// Density of the white noise of what is not saturated, of gyroscope and accelerometer.
+    pub(crate) fn within_range(&self, noise: &ImuNoise, settings: &ImuSettings) -> [f64; 2] {
+        let sheet = [noise.gyro_density, noise.accel_density];
+        [0, 1]
+            .map(|k| if self.estimated[k] > settings.noise_inflation * sheet[k] { self.estimated[k] } else { sheet[k] })
     }
 }
 

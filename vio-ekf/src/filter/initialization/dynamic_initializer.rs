@@ -8,9 +8,10 @@ use super::dynamic::result::{DynamicOutcome, InitialMotion};
 use super::dynamic::solver::{MIN_POINTS, solve};
 use super::dynamic::window::{BearingObservation, WindowInput};
 use crate::camera::model::CameraModel;
-use crate::filter::settings::DynamicInitializationSettings;
+use crate::filter::settings::{DynamicInitializationSettings, Settings};
 use crate::inertial::core_state::ImuCorrection;
 use crate::inertial::imu_buffer::ImuBuffer;
+use crate::inertial::imu_noise_estimator::{ImuNoiseEstimator, ImuSettings};
 use crate::inertial::preintegration::ImuPreintegration;
 use crate::samples::{Imu, ImuNoise};
 use crate::stamp::Stamp;
@@ -84,7 +85,7 @@ impl DynamicInitializer {
         stamp: Stamp,
         observed: impl Iterator<Item = (u64, Vector3<f64>)>,
         camera: &dyn CameraModel,
-        gravity: f64,
+        known: (&ImuNoise, &Settings),
     ) -> Option<Box<InitialMotion>> {
         let first = self.samples.front()?;
         if self.images.back().is_some_and(|last| stamp <= *last) || stamp < first.stamp {
@@ -104,7 +105,7 @@ impl DynamicInitializer {
             return None;
         }
         self.since_attempt = 0;
-        self.attempt(camera, gravity)
+        self.attempt(camera, known)
     }
 
     /// Drops images that are too old, and points that no image of the window sees any more.
@@ -121,7 +122,11 @@ impl DynamicInitializer {
         self.points.retain(|point| !point.observations.is_empty());
     }
 
-    fn attempt(&mut self, camera: &dyn CameraModel, gravity: f64) -> Option<Box<InitialMotion>> {
+    fn attempt(
+        &mut self,
+        camera: &dyn CameraModel,
+        (noise, settings): (&ImuNoise, &Settings),
+    ) -> Option<Box<InitialMotion>> {
         let long_enough = |point: &&Point| point.observations.len() >= MIN_OBSERVATIONS;
         let ids: Vec<u64> = self.points.iter().filter(long_enough).map(|point| point.id).collect();
         if ids.len() < MIN_POINTS {
@@ -134,7 +139,8 @@ impl DynamicInitializer {
             points: &points,
             camera: (camera.body_from_camera().translation.vector, camera.body_from_camera().rotation),
             focal_length: camera.focal_length(),
-            gravity,
+            gravity: settings.gravity,
+            densities: self.densities(noise, &settings.imu),
         };
         let buffer = self.buffer();
         let DynamicOutcome::Converged(mut motion) =
@@ -146,6 +152,13 @@ impl DynamicInitializer {
             landmark.id = ids[landmark.point];
         }
         Some(motion)
+    }
+
+    /// White noise of gyroscope and accelerometer at the end of the window.
+    fn densities(&self, sheet: &ImuNoise, settings: &ImuSettings) -> [f64; 2] {
+        let mut estimator = ImuNoiseEstimator::new(self.samples[0]);
+        let noise = self.samples.iter().skip(1).map(|sample| estimator.sample(sample, settings)).last();
+        noise.unwrap_or_default().within_range(sheet, settings)
     }
 
     /// The samples from the first image on; there must be one of each.

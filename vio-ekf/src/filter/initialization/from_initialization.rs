@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix2, SVector, Translation3, Vector2};
 
 use super::dynamic::result::InitialMotion;
-use super::dynamic::window::GLOBAL;
+use super::dynamic::window::ERRORS;
 use crate::camera::model::CameraModel;
 use crate::filter::depth_prior;
 use crate::filter::estimator::Estimator;
@@ -56,15 +56,15 @@ pub(crate) fn from_initialization(
     Some(tracking)
 }
 
-/// The covariance of the window's solution, and the samples' own noise over the window, which that took for none.
+/// The covariance of the window's solution, and what that took for none: the gyroscope's noise over the window, and how biases went.
 fn set_core_covariance(estimator: &mut Estimator, motion: &InitialMotion) {
     let core = motion.core * motion.covariance * motion.core.transpose();
     for r in 0..error_state::CORE {
         estimator.covariance.row_mut(r)[..error_state::CORE].copy_from_slice(core.column(r).as_slice());
     }
     let (time, noise) = (motion.duration, estimator.noise);
-    let tilt = noise.gyro_density.powi(2) * time;
-    let velocity = noise.accel_density.powi(2) * time + estimator.gravity.powi(2) * tilt * time * time / 3.0;
+    let tilt = motion.gyro_density.powi(2) * time;
+    let velocity = estimator.gravity.powi(2) * tilt * time * time / 3.0;
     for (row, variance) in [
         (error_state::VELOCITY, velocity),
         (error_state::ATTITUDE, tilt),
@@ -84,7 +84,7 @@ fn insert_landmarks(
     motion: &InitialMotion,
     mut observe: impl FnMut(u64) -> Option<(Bearing, Matrix2<f64>, Matrix2<f64>)>,
 ) {
-    let mut entered: Vec<(usize, SVector<f64, GLOBAL>)> = Vec::with_capacity(motion.landmarks.len());
+    let mut entered: Vec<(usize, SVector<f64, ERRORS>)> = Vec::with_capacity(motion.landmarks.len());
     for distance in &motion.landmarks {
         if estimator.covariance.size() + error_state::LANDMARK_SIZE > estimator.covariance.capacity() {
             break;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, SVector, Unit, UnitQuaternion, Vector2, Vector3};
 
 use super::result::InitialDistance;
-use super::window::{BIASES, GLOBAL, GRAVITY, InitializationWindow, VELOCITY};
+use super::window::{BIASES, CHANGES, ERRORS, GLOBAL, GRAVITY, InitializationWindow, NOISE, VELOCITY};
 use crate::filter::settings::DynamicInitializationSettings;
 use crate::filter::state::bearing::Bearing;
 use crate::inertial::preintegration::ImuPreintegration;
@@ -40,6 +40,10 @@ pub(super) struct Solution {
     /// The eliminated unknowns of the points.
     eliminated: Vec<EliminatedPoint>,
     sigma: f64,
+    /// Errors of the global unknowns by changes of velocity that the samples do not show...
+    pub(super) by_changes: SMatrix<f64, GLOBAL, NOISE>,
+    /// ... and of each point, those of the global ones apart.
+    points_by_changes: Vec<SMatrix<f64, 3, NOISE>>,
 }
 
 /// A point's three unknowns for given global ones: `step − link · global`, with `matrix` the information on them.
@@ -105,7 +109,10 @@ pub(super) fn refine(
     let information = prior(&global).0 + equations.matrix * sigma.powi(-2);
     let point_errors = equations.point_errors.iter().map(|m| m * window.input.focal_length).collect();
     let covariance = information.cholesky()?.inverse();
+    let (pull, points_by_changes) = pull_of_changes(window, kept, &global, &points, (&equations.eliminated, huber))?;
     Some(Solution {
+        by_changes: covariance * pull * sigma.powi(-2),
+        points_by_changes,
         converged,
         global,
         covariance,
@@ -182,16 +189,9 @@ fn equations(
         own[(2, 2)] = 1e-9;
         let mut square = 0.0;
         for (image, seen) in observations {
-            let view = project_point(&window.input.camera, anchor, &body_poses[*image], point)?;
-            let (direction, length) = Unit::try_new_and_get(view.scaled, 1e-3)?;
-            // Chord between the predicted and the seen direction, in the tangent plane of the latter.
-            let flat = Bearing::new(&Unit::new_unchecked(*seen)).differential().transpose();
-            let residual: Vector2<f64> = -(flat * direction.into_inner());
-            let flat = flat * (Matrix3::identity() - direction.into_inner() * direction.transpose()) / length;
-            let (by_point, by_global): (Matrix2x3<f64>, SMatrix<f64, 2, GLOBAL>) =
-                (flat * view.by_point, flat * view.by_global);
+            let observed = observe(&window.input.camera, (anchor, &body_poses[*image]), point, (seen, huber))?;
+            let Observed { residual, by_point, by_global, weight, .. } = observed;
             let error = residual.norm();
-            let weight = if error > huber { huber / error } else { 1.0 };
             own += by_point.transpose() * by_point * weight;
             link += by_point.transpose() * by_global * weight;
             right += by_point.transpose() * residual * weight;
@@ -210,6 +210,76 @@ fn equations(
         equations.point_errors.push((square / (2 * observations.len() - 3).max(1) as f64).sqrt());
     }
     Some(equations)
+}
+
+/// A direction that was seen, linearised: what it is off, and the derivatives of what is predicted.
+struct Observed {
+    residual: Vector2<f64>,
+    by_point: Matrix2x3<f64>,
+    by_global: SMatrix<f64, 2, GLOBAL>,
+    /// By the way from this image back to the first one of the point.
+    by_way: Matrix2x3<f64>,
+    weight: f64,
+}
+
+fn observe(
+    camera: &(Vector3<f64>, UnitQuaternion<f64>),
+    (anchor, here): (&BodyPose, &BodyPose),
+    point: &Point,
+    (seen, huber): (&Vector3<f64>, f64),
+) -> Option<Observed> {
+    let view = project_point(camera, anchor, here, point)?;
+    let (direction, length) = Unit::try_new_and_get(view.scaled, 1e-3)?;
+    // Chord between the predicted and the seen direction, in the tangent plane of the latter.
+    let flat = Bearing::new(&Unit::new_unchecked(*seen)).differential().transpose();
+    let residual: Vector2<f64> = -(flat * direction.into_inner());
+    let flat = flat * (Matrix3::identity() - direction.into_inner() * direction.transpose()) / length;
+    let error = residual.norm();
+    Some(Observed {
+        residual,
+        by_point: flat * view.by_point,
+        by_global: flat * view.by_global,
+        by_way: flat * view.by_way,
+        weight: if error > huber { huber / error } else { 1.0 },
+    })
+}
+
+/// Derivatives by the changes of velocity from those by a way that they add to.
+fn by_changes<const R: usize>(by_way: &SMatrix<f64, R, 3>, moved: [[f64; CHANGES]; 2]) -> SMatrix<f64, R, NOISE> {
+    let mut all = SMatrix::<f64, R, NOISE>::zeros();
+    for (k, (from, to)) in moved[0].iter().zip(moved[1]).enumerate() {
+        all.fixed_columns_mut::<3>(3 * k).copy_from(&(by_way * (from - to)));
+    }
+    all
+}
+
+/// What changes of velocity that the samples do not show add to the right side of the normal equations, per unit, and to each point.
+fn pull_of_changes(
+    window: &InitializationWindow,
+    kept: &[usize],
+    global: &Global,
+    points: &[Point],
+    (eliminated, huber): (&[EliminatedPoint], f64),
+) -> Option<(SMatrix<f64, GLOBAL, NOISE>, Vec<SMatrix<f64, 3, NOISE>>)> {
+    let body_poses = body_poses(window, global);
+    let mut pull = SMatrix::<f64, GLOBAL, NOISE>::zeros();
+    let of_point = |((&k, point), own): ((&usize, &Point), &EliminatedPoint)| {
+        let observations = &window.input.points[k];
+        let anchor = &body_poses[observations[0].0];
+        let mut right = SMatrix::<f64, 3, NOISE>::zeros();
+        for (image, seen) in observations {
+            let here = &body_poses[*image];
+            let observed = observe(&window.input.camera, (anchor, here), point, (seen, huber))?;
+            let moved = [anchor, here].map(|pose| window.moved_by_changes(pose.time));
+            let by_changes = by_changes(&observed.by_way, moved) * observed.weight;
+            right += observed.by_point.transpose() * by_changes;
+            pull += observed.by_global.transpose() * by_changes;
+        }
+        pull -= own.link.transpose() * right;
+        Some(own.matrix.cholesky()?.solve(&right))
+    };
+    let points = kept.iter().zip(points).zip(eliminated).map(of_point).collect::<Option<Vec<_>>>()?;
+    Some((pull, points))
 }
 
 /// Pose of the body at one image, in the axes of the first, and its derivatives by the unknowns.
@@ -246,6 +316,8 @@ struct PointProjection {
     /// By the tangent coordinates and the inverse distance in the first image of it.
     by_point: Matrix3<f64>,
     by_global: SMatrix<f64, 3, GLOBAL>,
+    /// By `p_a - p_j`.
+    by_way: Matrix3<f64>,
 }
 
 /// `q = C⁻¹ (R_j⁻¹ w − ρ t)` with `w = ρ (p_a − p_j) + R_a (ρ t + C μ)`.
@@ -274,7 +346,8 @@ fn project_point(
     let by_biases = (a.moved_by_biases - j.moved_by_biases) * rho - from_anchor.cross_matrix() * a.rotation_by_biases
         + w.cross_matrix() * j.rotation_by_biases;
     by_global.fixed_columns_mut::<6>(BIASES).copy_from(&(camera_from_first * by_biases));
-    scaled.iter().all(|v| v.is_finite()).then_some(PointProjection { scaled, by_point, by_global })
+    let by_way = camera_from_first * rho;
+    scaled.iter().all(|v| v.is_finite()).then_some(PointProjection { scaled, by_point, by_global, by_way })
 }
 
 impl Solution {
@@ -286,22 +359,29 @@ impl Solution {
     ) -> Vec<InitialDistance> {
         let body_poses = body_poses(window, &self.global);
         let last = window.preintegrations.len() - 1;
-        let distance = |((&k, point), own): ((&usize, &Point), &EliminatedPoint)| {
-            let observations = &window.input.points[k];
-            if observations.last()?.0 != last {
-                return None;
-            }
-            let view = project_point(&window.input.camera, &body_poses[observations[0].0], &body_poses[last], point)?;
-            let length = view.scaled.norm();
-            // ρ' = ρ / |q|
-            let radial = view.scaled.transpose() * (-point.rho / length.powi(3));
-            let mut by_point = (radial * view.by_point).transpose();
-            by_point.z += 1.0 / length;
-            let gradient = (radial * view.by_global).transpose() - own.link.transpose() * by_point;
-            let spread = own.matrix.cholesky()?.solve(&by_point) * (self.sigma * self.sigma);
-            let variance = by_point.dot(&spread);
-            Some(InitialDistance { point: k, id: 0, inverse_distance: point.rho / length, variance, gradient })
-        };
-        kept.iter().zip(&self.points).zip(&self.eliminated).filter_map(distance).collect()
+        let distance =
+            |(((&k, point), own), by_noise): (((&usize, &Point), &EliminatedPoint), &SMatrix<f64, 3, NOISE>)| {
+                let observations = &window.input.points[k];
+                if observations.last()?.0 != last {
+                    return None;
+                }
+                let ends = [observations[0].0, last].map(|image| &body_poses[image]);
+                let view = project_point(&window.input.camera, ends[0], ends[1], point)?;
+                let length = view.scaled.norm();
+                // ρ' = ρ / |q|
+                let radial = view.scaled.transpose() * (-point.rho / length.powi(3));
+                let mut by_point = (radial * view.by_point).transpose();
+                by_point.z += 1.0 / length;
+                let by_global = (radial * view.by_global).transpose() - own.link.transpose() * by_point;
+                let moved = ends.map(|pose| window.moved_by_changes(pose.time));
+                let itself = by_noise.transpose() * by_point - by_changes(&(radial * view.by_way), moved).transpose();
+                let mut gradient = SVector::<f64, ERRORS>::zeros();
+                gradient.fixed_rows_mut::<GLOBAL>(0).copy_from(&by_global);
+                gradient.fixed_rows_mut::<NOISE>(GLOBAL).copy_from(&(self.by_changes.transpose() * by_global + itself));
+                let spread = own.matrix.cholesky()?.solve(&by_point) * (self.sigma * self.sigma);
+                let variance = by_point.dot(&spread);
+                Some(InitialDistance { point: k, id: 0, inverse_distance: point.rho / length, variance, gradient })
+            };
+        kept.iter().zip(&self.points).zip(&self.eliminated).zip(&self.points_by_changes).filter_map(distance).collect()
     }
 }

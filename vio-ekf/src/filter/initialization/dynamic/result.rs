@@ -2,10 +2,10 @@
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 
-use super::window::GLOBAL;
+use super::window::ERRORS;
 use crate::inertial::error_state;
 
-/// State at the end of the window. Errors of the core and of the distances are those of the window's unknowns, times
+/// State at the end of the window. Errors of the core and of the distances are those of the window's unknowns and of its samples, times
 /// their derivatives.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct InitialMotion {
@@ -15,16 +15,18 @@ pub(crate) struct InitialMotion {
     pub(crate) attitude: UnitQuaternion<f64>,
     pub(crate) gyro_bias: Vector3<f64>,
     pub(crate) accel_bias: Vector3<f64>,
-    /// Covariance of the window's unknowns.
-    pub(crate) covariance: SMatrix<f64, GLOBAL, GLOBAL>,
+    /// Covariance of the errors of the window.
+    pub(crate) covariance: SMatrix<f64, ERRORS, ERRORS>,
     /// Errors of the core by theirs.
-    pub(crate) core: SMatrix<f64, { error_state::CORE }, GLOBAL>,
+    pub(crate) core: SMatrix<f64, { error_state::CORE }, ERRORS>,
     /// The points that the last image sees.
     pub(crate) landmarks: Vec<InitialDistance>,
     /// Relative standard deviation of the scale.
     pub(crate) scale_sigma: f64,
     /// Length of the window, s.
     pub(crate) duration: f64,
+    /// White noise of the gyroscope, rad/s/√Hz.
+    pub(crate) gyro_density: f64,
 }
 
 /// Inverse distance of a point at the last image.
@@ -36,8 +38,8 @@ pub(crate) struct InitialDistance {
     pub(crate) inverse_distance: f64,
     /// Variance of its own, independent of all else.
     pub(crate) variance: f64,
-    /// Derivative by the window's unknowns: what it has in common with all else.
-    pub(crate) gradient: SVector<f64, GLOBAL>,
+    /// Derivative by the errors of the window: what it has in common with all else.
+    pub(crate) gradient: SVector<f64, ERRORS>,
 }
 
 /// What came of a window.

@@ -6,7 +6,7 @@ use super::closed_form;
 use super::gyro_bias;
 use super::refinement::{self, Solution};
 use super::result::{DynamicOutcome, InitialDistance, InitialMotion};
-use super::window::{BIASES, GLOBAL, GRAVITY, InitializationWindow, VELOCITY, WindowInput};
+use super::window::{BIASES, CHANGES, ERRORS, GLOBAL, GRAVITY, InitializationWindow, NOISE, VELOCITY, WindowInput};
 use crate::filter::settings::DynamicInitializationSettings;
 use crate::filter::state::bearing::Bearing;
 use crate::inertial::error_state;
@@ -143,9 +143,21 @@ fn at_last_image(window: &InitializationWindow, kept: &[usize], found: &Solution
     core.fixed_rows_mut::<1>(error_state::ATTITUDE + 1).copy_from(&tilt.row(0));
     core.fixed_view_mut::<6, 6>(error_state::GYRO_BIAS, BIASES).fill_with_identity();
 
+    // What the samples do not show changes the velocity itself, besides what it does to the unknowns.
+    let mut by_changes = core * found.by_changes;
+    for k in 0..CHANGES {
+        let mut own = by_changes.fixed_view_mut::<3, 3>(error_state::VELOCITY, 3 * k);
+        own -= end_from_first;
+    }
+    let mut errors = SMatrix::<f64, { error_state::CORE }, ERRORS>::zeros();
+    errors.fixed_columns_mut::<GLOBAL>(0).copy_from(&core);
+    errors.fixed_columns_mut::<NOISE>(GLOBAL).copy_from(&by_changes);
+    let mut covariance = SMatrix::<f64, ERRORS, ERRORS>::identity() * window.change_variance();
+    covariance.fixed_view_mut::<GLOBAL, GLOBAL>(0, 0).copy_from(&found.covariance);
+
     let landmarks = found.distances_at_last_image(window, kept);
     let scale = |landmark: &InitialDistance| {
-        landmark.gradient.dot(&(found.covariance * landmark.gradient)).sqrt() / landmark.inverse_distance
+        landmark.gradient.dot(&(covariance * landmark.gradient)).sqrt() / landmark.inverse_distance
     };
     let scales: Vec<f64> = landmarks.iter().map(scale).collect();
     InitialMotion {
@@ -153,11 +165,12 @@ fn at_last_image(window: &InitializationWindow, kept: &[usize], found: &Solution
         attitude,
         gyro_bias: biases.fixed_rows::<3>(0).into_owned(),
         accel_bias: biases.fixed_rows::<3>(3).into_owned(),
-        covariance: found.covariance,
-        core,
+        covariance,
+        core: errors,
         scale_sigma: if scales.is_empty() { f64::INFINITY } else { median(scales) },
         landmarks,
         duration: time,
+        gyro_density: window.input.densities[0],
     }
 }
 
