@@ -43,14 +43,14 @@ impl BlockBounds {
         steps: &[Vector3<f32>; 3],
     ) -> Option<Self> {
         let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        let mut far = 0.0_f32;
+        let (mut near, mut far) = (f32::INFINITY, 0.0_f32);
         for corner in 0..8 {
             let at = |axis: usize| steps[axis] * if corner >> axis & 1 == 1 { (SIDE - 1) as f32 } else { 0.0 };
             let p = start + at(0) + at(1) + at(2);
             if p.z < NEAREST {
                 return Some(Self::ALL);
             }
-            far = far.max(p.z);
+            (near, far) = (near.min(p.z), far.max(p.z));
             for k in 0..2 {
                 let pixel = p[k] / p.z;
                 low[k] = low[k].min(pixel);
@@ -70,47 +70,47 @@ impl BlockBounds {
         let across = sides[0].div_ceil(TILE);
         let [columns, lines] = ranges;
         let line = |line: usize| &surface.tiles[line * across + columns.0..=line * across + columns.1];
+        // What is too far in front of all voxels or behind them touches none.
+        let matters = |tile: &Tile| tile.far + 1.001 * reach[0].abs() >= near && tile.near - 1.001 * reach[1] <= far;
         // The tile with the least error stands for all.
-        let mut flattest = &Tile::EMPTY;
+        let (mut flattest, mut rims) = (&Tile::EMPTY, NO_RIMS);
         for tile in (lines.0..=lines.1).flat_map(line) {
-            if !tile.is_empty() && (flattest.is_empty() || tile.error < flattest.error) {
+            rims = [rims[0].min(tile.rims[0]), rims[1].max(tile.rims[1])];
+            if matters(tile) && (flattest.is_empty() || tile.error < flattest.error) {
                 flattest = tile;
             }
         }
-        if flattest.is_empty() {
+        if flattest.is_empty() && rims[1] < rims[0] {
             return None;
         }
-        let mut rims = NO_RIMS;
         let omega = flattest.omega;
-        let (mut error, mut near) = (0.0_f32, f32::INFINITY);
+        let (mut error, mut nearest) = ([f32::INFINITY, f32::NEG_INFINITY], f32::INFINITY);
         for k in lines.0..=lines.1 {
             for (column, tile) in (columns.0..).zip(line(k)) {
-                // Two linear functions differ most at a corner; half a square more than there is, at the image's rim.
-                let half = 0.5 * TILE as f32;
-                let [u, v] = [column, k].map(|k| (k * TILE) as f32 + half);
-                let off = (tile.omega.at(u, v) - omega.at(u, v)).abs();
-                let turn = (tile.omega.slope[0] - omega.slope[0]).abs() + (tile.omega.slope[1] - omega.slope[1]).abs();
-                let bound = tile.error + off + half * turn;
-                if !tile.is_empty() {
-                    error = error.max(bound);
-                    near = near.min(tile.near);
-                    rims = [rims[0].min(tile.rims[0]), rims[1].max(tile.rims[1])];
+                if matters(tile) {
+                    let off = tile.off(&omega, [column, k]);
+                    error = [error[0].min(off[0]), error[1].max(off[1])];
+                    nearest = nearest.min(tile.near);
                 }
             }
         }
         let along = |p: &Vector3<f32>| omega.base * p.z + omega.slope[0] * p.x + omega.slope[1] * p.y;
         // Half a pixel between a voxel's projection and its pixel; and a little for the rounding.
-        let error = error + 0.5 * (omega.slope[0].abs() + omega.slope[1].abs());
-        let reach = reach.map(|reach| 1.001 * (reach.abs() / near + far * error) + 1e-4);
+        let half = 0.5 * (omega.slope[0].abs() + omega.slope[1].abs());
+        let error = [error[0] - half, error[1] + half];
+        let reach = [
+            1.001 * (reach[0] / nearest + error[0] * if error[0] < 0.0 { far } else { near }) - 1e-4,
+            1.001 * (reach[1] / nearest + error[1] * if error[1] > 0.0 { far } else { near }) + 1e-4,
+        ];
         let rims = [rims[0] - 1.001 * rim_reach[1], rims[1] - 1.001 * rim_reach[0]];
         let pixels = [0, 1].map(|k| [low[k].max(0.0) as usize, (high[k] + 1.0).min(sides[k] as f32) as usize]);
         let pixels = pixels.map(|[from, to]| [from.min(to), to]);
         Some(Self::new(1.0 - along(start), [0, 1, 2].map(|k| -along(&steps[k])), reach, rims, pixels))
     }
 
-    fn new(start: f32, step: [f32; 3], [behind, front]: [f32; 2], rims: [f32; 2], pixels: [[usize; 2]; 2]) -> Self {
+    fn new(start: f32, step: [f32; 3], [least, most]: [f32; 2], rims: [f32; 2], pixels: [[usize; 2]; 2]) -> Self {
         let end = step[0] * (LANES - 1) as f32;
-        let bounds = [-behind - end.max(0.0), front - end.min(0.0)];
+        let bounds = [least - end.max(0.0), most - end.min(0.0)];
         Self { start, step, bounds, rims, pixels }
     }
 }

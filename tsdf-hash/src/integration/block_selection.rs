@@ -9,28 +9,29 @@ use crate::blocks::block_key::BlockKey;
 use crate::error::Error;
 use crate::hashing::mix64;
 use crate::images::DepthView;
-use crate::integration::plane::Plane;
 use crate::integration::plane_tile::{TILE, Tile};
 use crate::integration::rims::reach;
 use crate::settings::Settings;
 
+/// Tiles along the edge of a square that is looked at as one where it is flat.
+const SQUARE: usize = 2;
 /// Keys remembered, to drop most repetitions before sorting.
 const RECENT: usize = 4096;
 
 /// Keys of the blocks near the pixels of some rows, in no order, with repetitions.
 pub(crate) fn select_blocks(
     first_row: usize,
-    planes: &[Plane],
+    omegas: &[f32],
     tiles: &[Tile],
     depth: &DepthView,
     world_from_camera: &Isometry3<f64>,
     settings: &Settings,
 ) -> Result<Vec<BlockKey>, Error> {
     let width = depth.width;
-    let rows = planes.len() / width;
+    let rows = omegas.len() / width;
     let mut search = Search {
         first_row,
-        planes,
+        omegas,
         depth,
         origin: world_from_camera.translation.vector / settings.block_size(),
         rotation: world_from_camera.rotation.to_rotation_matrix().into_inner() / settings.block_size(),
@@ -40,8 +41,12 @@ pub(crate) fn select_blocks(
         found: Covered::new(),
     };
     let across = width.div_ceil(TILE);
-    for (k, &tile) in tiles.iter().enumerate() {
-        search.tile([k % across * TILE, k / across * TILE], TILE, rows, [tile.near, tile.far])?;
+    for (v, lines) in tiles.chunks(SQUARE * across).enumerate() {
+        for u in (0..across).step_by(SQUARE) {
+            let square = lines.chunks(across).flat_map(|line| &line[u..(u + SQUARE).min(across)]);
+            let range = square.fold([f32::INFINITY, 0.0_f32], |r, tile| [r[0].min(tile.near), r[1].max(tile.far)]);
+            search.square([u * TILE, v * SQUARE * TILE], lines, rows, range)?;
+        }
     }
     Ok(search.found.keys)
 }
@@ -77,7 +82,7 @@ struct Covered {
 
 struct Search<'a> {
     first_row: usize,
-    planes: &'a [Plane],
+    omegas: &'a [f32],
     depth: &'a DepthView<'a>,
     /// Camera in the world, in blocks.
     origin: Vector3<f64>,
@@ -90,6 +95,19 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// Looks at a square of tiles together if their depths differ by less than a block, else at each.
+    fn square(&mut self, [u, v]: [usize; 2], lines: &[Tile], rows: usize, range: [f32; 2]) -> Result<(), Error> {
+        if f64::from(range[1] - range[0]) <= self.block {
+            return self.tile([u, v], SQUARE * TILE, rows, range);
+        }
+        for (line, v) in lines.chunks(self.depth.width.div_ceil(TILE)).zip((v..).step_by(TILE)) {
+            for (tile, u) in line.iter().zip((0..).step_by(TILE)).skip(u / TILE).take(SQUARE) {
+                self.tile([u, v], TILE, rows, [tile.near, tile.far])?;
+            }
+        }
+        Ok(())
+    }
+
     /// Looks at a square of pixels whose range of depths is known; where that is deeper than a block, at each slice of its
     /// quarters in which there are depths.
     fn tile(&mut self, [u, v]: [usize; 2], side: usize, rows: usize, [near, far]: [f32; 2]) -> Result<(), Error> {
@@ -137,8 +155,8 @@ impl Search<'_> {
 
     fn depths(&self, from: [usize; 2], to: [usize; 2]) -> impl Iterator<Item = f32> {
         let width = self.depth.width;
-        let pixels = (from[1]..to[1]).filter_map(move |v| self.planes.get(v * width + from[0]..v * width + to[0]));
-        pixels.flatten().filter_map(Plane::omega).map(|omega| 1.0 / omega)
+        let pixels = (from[1]..to[1]).filter_map(move |v| self.omegas.get(v * width + from[0]..v * width + to[0]));
+        pixels.flatten().filter(|&&omega| omega > 0.0).map(|omega| 1.0 / omega)
     }
 
     /// Blocks that the bounding boxes of the frustum's slices touch.

@@ -23,13 +23,14 @@ impl GapFilling {
         Self { noise: InverseDepthNoise::new(settings), slope }
     }
 
-    /// A copy of a line, NaN where nothing was measured, with the gaps between left and right filled.
+    /// A copy of a line, NaN where nothing was measured, with the gaps between left and right filled. The line has a pixel more
+    /// on each side.
     #[inline(always)]
     pub(crate) fn along(&self, line: &[f32], out: &mut [f32]) {
-        out.copy_from_slice(line);
-        let inner = out.iter_mut().skip(1).zip(line).zip(line.iter().skip(2));
-        for ((out, &left), &right) in inner {
-            *out = self.between([left, right], *out, self.slope[0]);
+        let width = out.len();
+        let line = &line[..width + 2];
+        for u in 0..width {
+            out[u] = self.between([line[u], line[u + 2]], line[u + 1], self.slope[0]);
         }
     }
 

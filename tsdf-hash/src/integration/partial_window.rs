@@ -3,7 +3,10 @@
 use crate::images::Intrinsics;
 use crate::integration::gap_filling::{GRANTED, STEEPEST};
 use crate::integration::inverse_depth_noise::InverseDepthNoise;
-use crate::integration::plane_windows::{HALO, LANES};
+use crate::integration::plane_windows::HALO;
+
+/// Pixels whose windows are fitted side by side: the widest vector register.
+pub(crate) const LANES: usize = 8;
 
 /// Pixels of the window along a row and a column.
 const SIDE: usize = 5;
@@ -26,20 +29,21 @@ impl PartialWindow {
         Self { noise, steepest: [k.fx, k.fy].map(|f| STEEPEST / f.abs() as f32) }
     }
 
-    /// Slopes of the inverse depth at the pixels `u..` of the middle line, per pixel; NaN if too few pixels lie on the surface
+    /// Slopes of the inverse depth at some pixels `u` of the middle line, per pixel; NaN if too few pixels lie on the surface
     /// of one.
     ///
     /// First all count that a surface through the pixel can reach, then those within the noise of the plane fitted to them.
     #[inline(always)]
-    pub(crate) fn slopes(&self, lines: [&[f32]; SIDE], u: usize) -> [Lanes; 2] {
-        let window = lines.map(|line| {
-            let line = &line[u + HALO - SIDE / 2..][..SIDE + LANES - 1];
-            let mut columns = [[0.0; LANES]; SIDE];
-            for (x, column) in columns.iter_mut().enumerate() {
-                column.copy_from_slice(&line[x..x + LANES]);
+    pub(crate) fn slopes(&self, lines: [&[f32]; SIDE], u: [usize; LANES]) -> [Lanes; 2] {
+        let mut window = [[[0.0; LANES]; SIDE]; SIDE];
+        for (line, columns) in lines.iter().zip(&mut window) {
+            for k in 0..LANES {
+                let line = &line[u[k] + HALO - SIDE / 2..][..SIDE];
+                for x in 0..SIDE {
+                    columns[x][k] = line[x];
+                }
             }
-            columns
-        });
+        }
         let own = window[SIDE / 2][SIDE / 2];
         let granted = lanes(|k| GRANTED * self.noise.sigma_inverse(own[k]));
         let steepest = self.steepest.map(|slope| lanes(|k| slope * own[k]));

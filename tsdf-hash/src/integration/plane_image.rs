@@ -11,10 +11,10 @@ use crate::error::Error;
 use crate::images::{DepthView, Intrinsics};
 use crate::integration::block_selection::{select_around_rims, select_blocks};
 use crate::integration::inverse_depth_noise::InverseDepthNoise;
-use crate::integration::partial_window::PartialWindow;
+use crate::integration::partial_window::{self, PartialWindow};
 use crate::integration::plane::Plane;
-use crate::integration::plane_tile::{TILE, Tile, TileLine};
-use crate::integration::plane_windows::{BEND_VARIANCE, BENDING, COUNT, LANES, ROUGHNESS, Row, SPREAD, Windows};
+use crate::integration::plane_tile::{TILE, Tile};
+use crate::integration::plane_windows::{BEND_VARIANCE, BENDING, COUNT, ROUGHNESS, Row, SPREAD, Windows};
 use crate::integration::rims::RimImage;
 use crate::parallel::in_chunks;
 use crate::rounding::ROUNDER;
@@ -28,6 +28,8 @@ const MOST_BEND: f32 = 3.0;
 /// Noise that is always granted, as a share of the model's: where the camera is better than the model, bends are found
 /// by what it shows (ours).
 const LEAST_NOISE: f32 = 0.1;
+/// Pixels that are searched for edges at once.
+const SCAN: usize = 8;
 
 /// All pixels of a frame, with the blocks near them.
 #[derive(Default)]
@@ -36,6 +38,8 @@ pub(crate) struct PlaneImage {
     pub(crate) height: usize,
     /// Row-major.
     pub(crate) planes: Vec<Plane>,
+    /// Inverse depths of the pixels, 1/m; 0 where one is not fused.
+    pub(crate) omegas: Vec<f32>,
     /// The fused depths in squares of [`TILE`] pixels, row-major.
     pub(crate) tiles: Vec<Tile>,
     /// The free space beside the rims of near surfaces.
@@ -54,6 +58,7 @@ pub(crate) struct PlaneImage {
 struct Band<'a> {
     first: usize,
     planes: &'a mut [Plane],
+    omegas: &'a mut [f32],
     tiles: &'a mut [Tile],
 }
 
@@ -68,20 +73,22 @@ impl PlaneImage {
         let (width, height) = (depth.width, depth.height);
         (self.width, self.height) = (width, height);
         self.planes.resize(width * height, Plane::NONE);
+        self.omegas.resize(width * height, 0.0);
         self.tiles.resize(width.div_ceil(TILE) * height.div_ceil(TILE), Tile::EMPTY);
         // Whole tiles, so that each band can look for its own blocks.
         let lines = height.div_ceil(TILE).div_ceil(settings.threads);
-        let planes = self.planes.chunks_mut(lines * TILE * width);
-        let mut bands: Vec<Band> = planes
+        let pixels = lines * TILE * width;
+        let pixels = self.planes.chunks_mut(pixels).zip(self.omegas.chunks_mut(pixels));
+        let mut bands: Vec<Band> = pixels
             .zip(self.tiles.chunks_mut(lines * width.div_ceil(TILE)))
             .enumerate()
-            .map(|(k, (planes, tiles))| Band { first: k * lines * TILE, planes, tiles })
+            .map(|(k, ((planes, omegas), tiles))| Band { first: k * lines * TILE, planes, omegas, tiles })
             .collect();
         let found = in_chunks(&mut bands, settings.threads, |bands| {
             let mut all = ([0; 3], Ok(Vec::new()), Vec::new());
             for band in bands {
                 let (counts, edges) = widest::run(BandFilling { band, depth, settings });
-                let keys = select_blocks(band.first, band.planes, band.tiles, depth, world_from_camera, settings);
+                let keys = select_blocks(band.first, band.omegas, band.tiles, depth, world_from_camera, settings);
                 all = ([0, 1, 2].map(|k| all.0[k] + counts[k]), keys, edges);
             }
             all
@@ -110,16 +117,16 @@ impl PlaneImage {
         world_from_camera: &Isometry3<f64>,
         settings: &Settings,
     ) -> Result<(), Error> {
-        self.rims.find(self.width, &self.planes, edges, &depth.intrinsics, settings);
+        self.rims.find(self.width, &self.omegas, edges, &depth.intrinsics, settings);
         let across = self.width.div_ceil(TILE);
         for &pixel in &self.rims.beside {
             let (pixel, z) = (pixel as usize, self.rims.rims[pixel as usize].depth());
             let range = &mut self.tiles[pixel / self.width / TILE * across + pixel % self.width / TILE].rims;
             *range = [range[0].min(z), range[1].max(z)];
         }
-        let sources = self.rims.sources.iter().filter_map(|&pixel| {
+        let sources = self.rims.sources.iter().map(|&pixel| {
             let pixel = pixel as usize;
-            Some(([pixel % self.width, pixel / self.width], self.planes[pixel].omega()?))
+            ([pixel % self.width, pixel / self.width], self.omegas[pixel])
         });
         self.keys.extend(select_around_rims(sources, depth, world_from_camera, settings)?);
         Ok(())
@@ -150,47 +157,48 @@ impl Band<'_> {
         let noise = InverseDepthNoise::new(settings);
         let per_metre = (f64::from(ONE) / settings.truncation()) as f32;
         let mut windows = Windows::new(depth, settings, self.first);
-        let (mut columns, mut tile_line) = (Columns::new(width), TileLine::new(width));
+        let mut columns = Columns::new(width);
         let partial = PartialWindow::new(&depth.intrinsics, noise);
         let mut all = [0; 3];
         let mut edges = Vec::new();
-        let lines = self.planes.chunks_mut(TILE * width).zip(self.tiles.chunks_mut(width.div_ceil(TILE)));
-        for (line, (planes, tiles)) in lines.enumerate() {
-            for (row, planes) in planes.chunks_exact_mut(width).enumerate() {
-                let row = line * TILE + row;
-                let lens = Lens::new(&depth.intrinsics, self.first + row, per_metre);
-                let line = windows.row(row);
-                read_row(&line, lens, noise, &mut columns);
-                let start = ((self.first + row) * width) as u32;
-                read_edges(&line, lens, noise, partial, &mut columns, |u| edges.push(start + u as u32));
-                let counts = count(line.measured, &columns.omega);
-                columns.write(planes);
-                tile_line.push(&columns.omega);
-                all = [0, 1, 2].map(|k| all[k] + counts[k] as usize);
+        for (row, (planes, omegas)) in self.planes.chunks_mut(width).zip(self.omegas.chunks_mut(width)).enumerate() {
+            let lens = Lens::new(&depth.intrinsics, self.first + row, per_metre);
+            let line = windows.row(row);
+            read_row(&line, lens, noise, &mut columns, omegas);
+            let start = ((self.first + row) * width) as u32;
+            read_edges(&line, lens, noise, partial, &mut columns, omegas, |u| edges.push(start + u as u32));
+            let counts = count(line.measured, omegas);
+            columns.write(omegas, planes);
+            all = [0, 1, 2].map(|k| all[k] + counts[k] as usize);
+        }
+        let lines = self.planes.chunks(TILE * width).zip(self.omegas.chunks(TILE * width));
+        for (line, ((planes, omegas), tiles)) in lines.zip(self.tiles.chunks_mut(width.div_ceil(TILE))).enumerate() {
+            for (k, tile) in tiles.iter_mut().enumerate() {
+                *tile = Tile::of(width, [k * TILE, self.first + line * TILE], planes, omegas);
             }
-            tile_line.finish(self.first + line * TILE, planes, tiles);
         }
         (all, edges)
     }
 }
 
-/// A row of planes, and their inverse depths; 0 where a pixel is not fused.
+/// A row of planes.
 struct Columns {
     offset: Vec<f32>,
     slope: [Vec<f32>; 2],
-    omega: Vec<f32>,
+    /// The pixels beside gaps and edges.
+    edges: Vec<usize>,
 }
 
 impl Columns {
     fn new(width: usize) -> Self {
         let column = || vec![0.0; width];
-        Self { offset: column(), slope: [column(), column()], omega: column() }
+        Self { offset: column(), slope: [column(), column()], edges: Vec::new() }
     }
 
     #[inline(always)]
-    fn write(&self, planes: &mut [Plane]) {
+    fn write(&self, omegas: &[f32], planes: &mut [Plane]) {
         let slopes = self.slope[0].iter().zip(&self.slope[1]);
-        for (((plane, &offset), &omega), (&u, &v)) in planes.iter_mut().zip(&self.offset).zip(&self.omega).zip(slopes) {
+        for (((plane, &offset), &omega), (&u, &v)) in planes.iter_mut().zip(&self.offset).zip(omegas).zip(slopes) {
             *plane = Plane { offset, scaled_omega: offset * omega, scaled_slope: [u, v] };
         }
     }
@@ -199,10 +207,10 @@ impl Columns {
 /// Fits the planes of a row. Structures of arrays, because the
 /// arithmetic then runs in vector registers.
 #[inline(always)]
-fn read_row(row: &Row, lens: Lens, noise: InverseDepthNoise, out: &mut Columns) {
+fn read_row(row: &Row, lens: Lens, noise: InverseDepthNoise, out: &mut Columns, omegas: &mut [f32]) {
     // Slices of known length spare the loop its bounds checks.
-    let width = out.omega.len();
-    let (omegas, offsets) = (&mut out.omega[..width], &mut out.offset[..width]);
+    let width = omegas.len();
+    let offsets = &mut out.offset[..width];
     let [slopes_u, slopes_v] = &mut out.slope;
     let (slopes_u, slopes_v) = (&mut slopes_u[..width], &mut slopes_v[..width]);
     let [above, here, below] = row.around;
@@ -238,27 +246,22 @@ fn read_edges(
     noise: InverseDepthNoise,
     partial: PartialWindow,
     out: &mut Columns,
+    omegas: &mut [f32],
     mut found: impl FnMut(usize),
 ) {
-    let width = out.omega.len();
     let is_edge = |measured: f32, smooth: f32| (measured > 0.0) & smooth.is_nan();
-    for first in (0..width).step_by(LANES) {
-        // What is left at the end of the row is looked at in any case.
-        if let Some(measured) = row.measured[first..].first_chunk::<LANES>()
-            && let Some(smooth) = row.smooth[first..].first_chunk::<LANES>()
-            && !measured.iter().zip(smooth).fold(false, |any, (&m, &s)| any | is_edge(m, s))
-        {
-            continue;
+    out.edges.clear();
+    for (first, (measured, smooth)) in (0..).step_by(SCAN).zip(row.measured.chunks(SCAN).zip(row.smooth.chunks(SCAN))) {
+        let pixels = || measured.iter().zip(smooth).map(|(&measured, &smooth)| is_edge(measured, smooth));
+        if pixels().fold(false, |any, is_edge| any | is_edge) {
+            out.edges.extend((first..).zip(pixels()).filter(|&(_, is_edge)| is_edge).map(|(u, _)| u));
         }
-        let group = first..(first + LANES).min(width);
-        let [along, down] = partial.slopes(row.wide, first);
-        for u in group.filter(|&u| is_edge(row.measured[u], row.smooth[u])) {
-            let slope = [along, down].map(|slope| slope[u - first]);
-            if slope[0].is_nan() {
-                continue;
-            }
-            let seen = observe(lens, noise, u, row.measured[u], slope);
-            (out.offset[u], out.omega[u]) = (seen.offset, seen.omega);
+    }
+    for group in out.edges.chunks(partial_window::LANES) {
+        let [along, down] = partial.slopes(row.wide, std::array::from_fn(|k| *group.get(k).unwrap_or(&group[0])));
+        for (k, &u) in group.iter().enumerate().filter(|&(k, _)| !along[k].is_nan()) {
+            let seen = observe(lens, noise, u, row.measured[u], [along[k], down[k]]);
+            (out.offset[u], omegas[u]) = (seen.offset, seen.offset * seen.omega / seen.offset);
             (out.slope[0][u], out.slope[1][u]) = (seen.slope_u, seen.slope_v);
             found(u);
         }

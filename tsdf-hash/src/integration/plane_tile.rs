@@ -3,6 +3,7 @@
 //! What is said here only spares work: it bounds what fusion finds voxel by voxel.
 
 use crate::integration::plane::Plane;
+use crate::rounding::{max, min};
 
 /// Edge of a square, pixels.
 pub(crate) const TILE: usize = 8;
@@ -45,89 +46,62 @@ impl Tile {
     pub(crate) const EMPTY: Self =
         Self { near: f32::INFINITY, far: 0.0, omega: Linear { base: 0.0, slope: [0.0; 2] }, error: 0.0, rims: NO_RIMS };
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.far < self.near
-    }
-}
-
-/// A line of squares in the making.
-pub(crate) struct TileLine {
-    width: usize,
-    /// Inverse depths, row-major, 0 where a pixel is not fused.
-    omegas: Vec<f32>,
-    low: Vec<f32>,
-    high: Vec<f32>,
-    /// For each column, the linear function of its square at the square's first row, and per row.
-    base: Vec<f32>,
-    down: Vec<f32>,
-    error: Vec<f32>,
-}
-
-impl TileLine {
-    pub(crate) fn new(width: usize) -> Self {
-        let column = || vec![0.0; width];
-        let omegas = Vec::with_capacity(width * TILE);
-        Self { width, omegas, low: column(), high: column(), base: column(), down: column(), error: column() }
-    }
-
-    /// Adds a row of inverse depths, 0 where a pixel is not fused.
+    /// Describes the square whose first pixel is `at`, from the lines of pixels that it is in, of an image with this width.
     #[inline(always)]
-    pub(crate) fn push(&mut self, omegas: &[f32]) {
-        if self.omegas.is_empty() {
-            self.low.fill(f32::INFINITY);
-            self.high.fill(0.0);
+    pub(crate) fn of(width: usize, at: [usize; 2], planes: &[Plane], omegas: &[f32]) -> Self {
+        // What is beyond the image is as what is not fused.
+        let mut square = [[0.0; TILE]; TILE];
+        let columns = at[0]..(at[0] + TILE).min(width);
+        for (line, omegas) in square.iter_mut().zip(omegas.chunks_exact(width)) {
+            line[..columns.len()].copy_from_slice(&omegas[columns.clone()]);
         }
-        self.omegas.extend_from_slice(omegas);
-        for ((&omega, low), high) in omegas.iter().zip(&mut self.low).zip(&mut self.high) {
-            let floor = if omega > 0.0 { omega } else { f32::INFINITY };
-            *low = if floor < *low { floor } else { *low };
-            *high = if omega > *high { omega } else { *high };
-        }
-    }
-
-    /// Describes the squares of the rows that were added, of which the image's row `first` is the topmost, and forgets
-    /// the rows.
-    #[inline(always)]
-    pub(crate) fn finish(&mut self, first: usize, planes: &[Plane], tiles: &mut [Tile]) {
-        let width = self.width;
-        let rows = self.omegas.len() / width;
-        for (k, tile) in tiles.iter_mut().enumerate() {
-            let columns = k * TILE..(k * TILE + TILE).min(width);
-            let low = self.low[columns.clone()].iter().fold(f32::INFINITY, |a, &b| a.min(b));
-            let high = self.high[columns.clone()].iter().fold(0.0_f32, |a, &b| a.max(b));
-            // Of the pixel in the middle, if it is fused.
-            let (u, v) = (columns.start.midpoint(columns.end), rows / 2);
-            let plane = &planes[v * width + u];
-            let omega = match plane.omega() {
-                Some(omega) => Linear::through(omega, plane.scaled_slope.map(|s| s / plane.offset), [u, first + v]),
-                None => Linear { base: f32::midpoint(low.min(high), high), slope: [0.0; 2] },
-            };
-            *tile = if high > 0.0 {
-                Tile { near: 1.0 / high, far: 1.0 / low, omega, error: 0.0, rims: NO_RIMS }
-            } else {
-                Tile::EMPTY
-            };
-            for u in columns {
-                self.base[u] = omega.at(u as f32, first as f32);
-                self.down[u] = omega.slope[1];
+        let (mut low, mut high) = ([f32::INFINITY; TILE], [0.0; TILE]);
+        for line in &square {
+            for (&omega, (low, high)) in line.iter().zip(low.iter_mut().zip(&mut high)) {
+                *low = min(if omega > 0.0 { omega } else { f32::INFINITY }, *low);
+                *high = max(omega, *high);
             }
         }
-        self.error.fill(0.0);
-        for (row, omegas) in self.omegas.chunks_exact(width).enumerate() {
-            widen(omegas, row as f32, &self.base, &self.down, &mut self.error);
+        let (low, high) = (low.into_iter().fold(f32::INFINITY, min), high.into_iter().fold(0.0, max));
+        if high <= 0.0 {
+            return Self::EMPTY;
         }
-        for (tile, error) in tiles.iter_mut().zip(self.error.chunks(TILE)) {
-            tile.error = error.iter().fold(0.0_f32, |a, &b| a.max(b));
+        // Of the pixel in the middle, if it is fused.
+        let (u, v) = (columns.start.midpoint(columns.end), planes.len() / width / 2);
+        let plane = &planes[v * width + u];
+        let omega = match plane.omega() {
+            Some(omega) => Linear::through(omega, plane.scaled_slope.map(|s| s / plane.offset), [u, at[1] + v]),
+            None => Linear { base: f32::midpoint(low, high), slope: [0.0; 2] },
+        };
+        let mut error = [0.0; TILE];
+        for (line, v) in square.iter().zip(at[1]..) {
+            for (k, (&value, error)) in line.iter().zip(&mut error).enumerate() {
+                let off = (value - omega.at((at[0] + k) as f32, v as f32)).abs();
+                *error = max(if value > 0.0 { off } else { 0.0 }, *error);
+            }
         }
-        self.omegas.clear();
+        let error = error.into_iter().fold(0.0, max);
+        Self { near: 1.0 / high, far: 1.0 / low, omega, error, rims: NO_RIMS }
     }
-}
 
-#[inline(always)]
-fn widen(omegas: &[f32], row: f32, base: &[f32], down: &[f32], error: &mut [f32]) {
-    for (((&omega, &base), &down), error) in omegas.iter().zip(base).zip(down).zip(error) {
-        let off = (omega - (base + row * down)).abs();
-        let off = if omega > 0.0 { off } else { 0.0 };
-        *error = if off > *error { off } else { *error };
+    /// How far its inverse depths are from a linear function, at least and at most; it is the square at this column and line.
+    #[inline(always)]
+    pub(crate) fn off(&self, other: &Linear, at: [usize; 2]) -> [f32; 2] {
+        // Two linear functions differ most at a corner; half a square more than there is, at the image's rim.
+        let half = 0.5 * TILE as f32;
+        let [u, v] = at.map(|k| (k * TILE) as f32 + half);
+        let middle = other.at(u, v);
+        let own = [self.omega.slope[0] - other.slope[0], self.omega.slope[1] - other.slope[1]];
+        let by_plane = self.error + half * (own[0].abs() + own[1].abs());
+        let off = self.omega.at(u, v) - middle;
+        let by_range = half * (other.slope[0].abs() + other.slope[1].abs());
+        [
+            max(off - by_plane, 1.0 / self.far - middle - by_range),
+            min(off + by_plane, 1.0 / self.near - middle + by_range),
+        ]
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.far < self.near
     }
 }

@@ -13,9 +13,6 @@ use crate::settings::Settings;
 const RADIUS: usize = 3;
 /// Pixels of context on each side of a row: the window, one for the edge test, and one for the filling of gaps.
 pub(crate) const HALO: usize = RADIUS + 2;
-/// Neighbouring pixels whose windows are summed side by side at edges: the widest vector register. Lines are so much longer,
-/// because their last pixels have neighbours, too.
-pub(crate) const LANES: usize = 8;
 /// Lines in a ring: from the first line of a window to the one that its last gap needs.
 const RING: usize = 2 * HALO;
 /// Values in the window.
@@ -30,18 +27,15 @@ pub(crate) const ROUGHNESS: f32 = COUNT * 24.0;
 pub(crate) const BEND_VARIANCE: f32 = 1.0 / 6.0;
 
 /// The last lines of something.
-struct Ring {
-    stride: usize,
-    values: Vec<f32>,
-}
+struct Ring([Vec<f32>; RING]);
 
 impl Ring {
-    fn new(stride: usize) -> Self {
-        Self { stride, values: vec![f32::NAN; stride * RING] }
+    fn new(length: usize) -> Self {
+        Self([(); RING].map(|()| vec![f32::NAN; length]))
     }
 
     fn line(&self, k: usize) -> &[f32] {
-        &self.values[k % RING * self.stride..][..self.stride]
+        &self.0[k % RING]
     }
 
     /// Seven lines from `k` on.
@@ -49,8 +43,8 @@ impl Ring {
         [0, 1, 2, 3, 4, 5, 6].map(|j| self.line(k + j))
     }
 
-    fn line_mut(&mut self, k: usize) -> &mut [f32] {
-        &mut self.values[k % RING * self.stride..][..self.stride]
+    fn line_mut(&mut self, k: usize) -> &mut Vec<f32> {
+        &mut self.0[k % RING]
     }
 }
 
@@ -62,12 +56,10 @@ pub(crate) struct Windows<'a> {
     far: f32,
     noise: InverseDepthNoise,
     gaps: GapFilling,
-    /// Inverse depth as it was measured, NaN where there is none: arithmetic then spreads the gaps.
+    /// Inverse depth as it was measured, NaN where there is none: arithmetic then spreads the gaps. With a pixel on each side.
     measured: Ring,
     /// The same with gaps filled and with `HALO` pixels on each side.
     raw: Ring,
-    /// A line of it.
-    filled: Vec<f32>,
     /// The same with NaN at edges.
     smooth: Ring,
     /// Along the line, over the window: sum, first moment, second difference.
@@ -104,7 +96,7 @@ pub(crate) struct Row<'a> {
 
 impl<'a> Windows<'a> {
     pub(crate) fn new(depth: &'a DepthView<'a>, settings: &Settings, first: usize) -> Self {
-        let (width, padded) = (depth.width, depth.width + 2 * HALO + LANES);
+        let (width, padded) = (depth.width, depth.width + 2 * HALO);
         let mut windows = Self {
             depth,
             first,
@@ -112,9 +104,8 @@ impl<'a> Windows<'a> {
             far: settings.max_depth as f32,
             noise: InverseDepthNoise::new(settings),
             gaps: GapFilling::new(&depth.intrinsics, settings),
-            measured: Ring::new(width),
+            measured: Ring::new(width + 2),
             raw: Ring::new(padded),
-            filled: vec![f32::NAN; padded],
             smooth: Ring::new(padded),
             total: Ring::new(width),
             moment: Ring::new(width),
@@ -139,7 +130,7 @@ impl<'a> Windows<'a> {
         add_lines(self.bend.seven(first), true, bend);
         add_lines(self.roughness.seven(first), false, roughness);
         Row {
-            measured: self.measured.line(row + HALO),
+            measured: &self.measured.line(row + HALO)[1..][..width],
             wide: [0, 1, 2, 3, 4].map(|k| self.raw.line(row + HALO - 2 + k)),
             around: [HALO - 1, HALO, HALO + 1].map(|k| &self.raw.line(row + k)[HALO - 1..][..width + 2]),
             smooth: &self.smooth.line(row + HALO)[HALO..][..width],
@@ -159,12 +150,10 @@ impl<'a> Windows<'a> {
         if k < 2 {
             return;
         }
-        let mut filled = std::mem::take(&mut self.filled);
-        filled.copy_from_slice(self.raw.line(k - 1));
+        let mut filled = std::mem::take(self.raw.line_mut(k - 1));
         let beside = [k - 2, k].map(|k| &self.raw.line(k)[HALO..][..width]);
         self.gaps.across(beside, &mut filled[HALO..][..width]);
-        self.raw.line_mut(k - 1).copy_from_slice(&filled);
-        self.filled = filled;
+        *self.raw.line_mut(k - 1) = filled;
         if k < 3 {
             return;
         }
@@ -180,7 +169,7 @@ impl<'a> Windows<'a> {
     fn read(&mut self, k: usize) {
         let width = self.depth.width;
         let (near, far) = (self.near, self.far);
-        let out = &mut self.measured.line_mut(k)[..width];
+        let out = &mut self.measured.line_mut(k)[1..][..width];
         let Some(v) = (self.first + k).checked_sub(HALO).filter(|&v| v < self.depth.height) else {
             return out.fill(f32::NAN);
         };

@@ -7,7 +7,6 @@
 use crate::images::Intrinsics;
 use crate::integration::gap_filling::{GRANTED, STEEPEST};
 use crate::integration::inverse_depth_noise::InverseDepthNoise;
-use crate::integration::plane::Plane;
 use crate::settings::Settings;
 
 /// Free space is known so far beside and in front of rims, in voxels: no corner of a cell is farther from a surface in it (√3).
@@ -65,7 +64,8 @@ pub(crate) fn reach(settings: &Settings) -> [f32; 2] {
 
 /// What tells a rim from a steep surface, and how far to look.
 struct Rule<'a> {
-    planes: &'a [Plane],
+    /// Inverse depths, 0 where nothing is known.
+    omegas: &'a [f32],
     noise: InverseDepthNoise,
     /// Largest relative change per pixel along a row and along a column.
     steepest: [f32; 2],
@@ -89,17 +89,16 @@ impl Rule<'_> {
     fn walk(&self, start: Start, (step, room): (isize, usize), axis: usize, mut found: impl FnMut(usize, Rim) -> bool) {
         let Start { at, omega, pixels } = start;
         let (granted, slope) = (GRANTED * self.noise.sigma_inverse(omega), self.steepest[axis] * omega);
+        let voxel = self.voxel * omega;
         let most = ((FRONT as f32 * self.pixels * omega) as u32 + 1).min(PIXEL_BITS).min(room as u32);
         let (mut at, depth) = (at as usize, 1.0 / omega);
         for n in 1..=most {
             at = at.wrapping_add_signed(step);
-            let Plane { offset, scaled_omega, .. } = self.planes[at];
-            // What lies there is unknown.
-            if scaled_omega.is_nan() || scaled_omega <= 0.0 {
+            let there = self.omegas[at];
+            if there <= 0.0 {
                 continue;
             }
-            let (by_noise, by_depth) = ((granted + slope * n as f32) * offset, self.voxel * omega * scaled_omega);
-            let behind = omega * offset - scaled_omega;
+            let (by_noise, by_depth, behind) = (granted + slope * n as f32, voxel * there, omega - there);
             if !(behind > by_noise && behind > by_depth && found(at, Rim::new(depth, n.max(pixels)))) {
                 break;
             }
@@ -111,25 +110,25 @@ impl RimImage {
     /// Finds the rims among the pixels `edges` and what lies beside them: first along rows, then from there along columns.
     ///
     /// A distance is the larger one of the two along row and column.
-    pub(crate) fn find(&mut self, width: usize, planes: &[Plane], edges: &[u32], k: &Intrinsics, settings: &Settings) {
+    pub(crate) fn find(&mut self, width: usize, omegas: &[f32], edges: &[u32], k: &Intrinsics, settings: &Settings) {
         for &pixel in &self.beside {
             if let Some(rim) = self.rims.get_mut(pixel as usize) {
                 *rim = Rim::NONE;
             }
         }
-        self.rims.resize(planes.len(), Rim::NONE);
+        self.rims.resize(omegas.len(), Rim::NONE);
         self.beside.clear();
         self.sources.clear();
         let rule = Rule {
-            planes,
+            omegas,
             noise: InverseDepthNoise::new(settings),
             steepest: [k.fx, k.fy].map(|f| STEEPEST / f.abs() as f32),
             voxel: settings.voxel_size as f32,
             pixels: (settings.voxel_size * k.fx.abs().max(k.fy.abs())) as f32,
         };
         let own = |&at: &u32| {
-            let omega = planes[at as usize].omega().filter(|omega| rule.pixels * omega >= LEAST_PIXELS)?;
-            Some(Start { at, omega, pixels: 0 })
+            let omega = omegas[at as usize];
+            (rule.pixels * omega >= LEAST_PIXELS).then_some(Start { at, omega, pixels: 0 })
         };
         for start in edges.iter().filter_map(own) {
             let column = start.at as usize % width;
@@ -144,7 +143,7 @@ impl RimImage {
             Start { at, omega: 1.0 / rim.depth(), pixels: rim.pixels() }
         });
         let starts: Vec<Start> = edges.iter().filter_map(own).chain(along_rows).collect();
-        let rows = planes.len() / width;
+        let rows = omegas.len() / width;
         for start in starts {
             let row = start.at as usize / width;
             let known = self.beside.len();
@@ -180,7 +179,6 @@ mod tests {
     use super::{LEAST_PIXELS, Rim, RimImage};
     use crate::hashing::mix64;
     use crate::images::Intrinsics;
-    use crate::integration::plane::Plane;
     use crate::settings::Settings;
 
     const WIDTH: usize = 60;
@@ -193,12 +191,13 @@ mod tests {
     }
 
     /// A rectangle a metre away before a wall, with gaps in the wall.
-    fn scene(is_gap: impl Fn(usize) -> bool) -> Vec<Plane> {
-        let plane = |at: usize| match (is_near(at), is_gap(at)) {
-            (false, true) => Plane::NONE,
-            (near, _) => Plane { offset: 3.0, scaled_omega: if near { 3.0 } else { 2.0 }, scaled_slope: [0.0; 2] },
+    fn scene(is_gap: impl Fn(usize) -> bool) -> Vec<f32> {
+        let omega = |at: usize| match (is_near(at), is_gap(at)) {
+            (false, true) => 0.0,
+            (true, _) => 1.0,
+            (false, false) => 2.0 / 3.0,
         };
-        (0..WIDTH * HEIGHT).map(plane).collect()
+        (0..WIDTH * HEIGHT).map(omega).collect()
     }
 
     /// By brute force; the second time in the same memory.

@@ -285,7 +285,7 @@ impl FrameUpdate<'_> {
         for &key in &change.touched {
             let Some((block, history)) = storage.active.get_mut(key) else { continue };
             job.count(history);
-            if block.is_empty() {
+            if job.operation == Operation::Deintegrate && block.is_empty() {
                 emptied.push(key);
             }
         }
