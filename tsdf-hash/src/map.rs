@@ -218,7 +218,7 @@ impl Map {
         })
     }
 
-    /// Bytes in active memory: what [`Settings::max_bytes`] caps. The working memory of a call (about 17 bytes per pixel)
+    /// Bytes in active memory: what [`Settings::max_bytes`] caps. The working memory of a call (about 24 bytes per pixel)
     /// and the meshes handed out are not in it.
     pub fn bytes(&self) -> usize {
         self.storage.active_bytes()

@@ -15,6 +15,8 @@ use crate::settings::Settings;
 
 /// Tiles along the edge of a square that is looked at as one where it is flat.
 const SQUARE: usize = 2;
+/// Boxes remembered, to drop repetitions.
+const BOXES: usize = 64;
 /// Keys remembered, to drop most repetitions before sorting.
 const RECENT: usize = 4096;
 
@@ -76,6 +78,8 @@ pub(crate) fn select_around_rims(
 
 /// Keys of blocks, in no order, with repetitions.
 struct Covered {
+    /// The last boxes of blocks, by their lower corners: many lie in the same blocks as one before.
+    boxes: [[Point3<i32>; 2]; BOXES],
     recent: Vec<BlockKey>,
     keys: Vec<BlockKey>,
 }
@@ -188,7 +192,11 @@ impl Search<'_> {
 
 impl Covered {
     fn new() -> Self {
-        Self { recent: vec![BlockKey(u64::MAX); RECENT], keys: Vec::new() }
+        Self {
+            boxes: [[Point3::new(i32::MAX, 0, 0); 2]; BOXES],
+            recent: vec![BlockKey(u64::MAX); RECENT],
+            keys: Vec::new(),
+        }
     }
 
     /// Adds the blocks that a box touches, its corners in blocks.
@@ -199,6 +207,10 @@ impl Covered {
         // `f64::floor` is a call where the processor is not known.
         let floor = |c: f64| c as i32 - i32::from(c < f64::from(c as i32));
         let [low, high] = [low, high].map(|p| p.map(floor));
+        let known = &mut self.boxes[(low.x ^ low.y << 2 ^ low.z << 4) as usize % BOXES];
+        if std::mem::replace(known, [low, high]) == [low, high] {
+            return Ok(());
+        }
         for x in low.x..=high.x {
             for y in low.y..=high.y {
                 for z in low.z..=high.z {

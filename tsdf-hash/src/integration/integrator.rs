@@ -1,16 +1,13 @@
 //! The update of one block by one frame.
 
-use std::hint::black_box;
-
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::blocks::block_key::BlockKey;
-use crate::blocks::voxel_block::{ONE, SIDE, VOXELS, VoxelBlock};
+use crate::blocks::voxel_block::{ONE, SIDE, VoxelBlock};
 use crate::error::Error;
-use crate::images::{ColourData, ColourView, DepthView, Intrinsics, check_pose};
+use crate::images::{ColourView, DepthView, Intrinsics, check_pose};
 use crate::integration::block_bounds::BlockBounds;
 use crate::integration::colour::{ColourSource, accumulate_colour};
-use crate::integration::plane::Plane;
 use crate::integration::plane_image::PlaneImage;
 use crate::integration::rims::{self, Rim};
 use crate::integration::voxel_lanes::{LANES, ProjectedVoxels, RowOffsets, mask};
@@ -20,10 +17,6 @@ use crate::widest::{self, Work};
 
 /// Colours are taken this close to the surface, in voxels (ours).
 const COLOUR_REACH: f64 = 1.5;
-/// Pixels under a block beyond which its voxels read but a part of them: each has sixteen for itself (ours).
-const MOST_FETCHED: usize = 16 * VOXELS;
-/// Bytes that come from memory at once.
-const CACHE_LINE: usize = 64;
 
 /// Whether a frame is put in or taken out.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -170,37 +163,11 @@ impl<'a> Frame<'a> {
         let Some(bounds) = BlockBounds::under(self.plane_image, self.reach, self.rim_reach, &start, &steps) else {
             return UpdateCount::default();
         };
-        self.fetch(bounds.pixels);
         if bounds.rims[0] <= bounds.rims[1] {
             self.update_rows::<INTEGRATE, true>(block, &start, &steps, &bounds)
         } else {
             self.update_rows::<INTEGRATE, false>(block, &start, &steps, &bounds)
         }
-    }
-
-    /// Reads the pixels under a block once, line by line: what is not in the cache is then on its way for all of them at
-    /// once, where each row of voxels would wait for its own.
-    #[inline(always)]
-    fn fetch(&self, [columns, lines]: [[usize; 2]; 2]) {
-        if (columns[1] - columns[0]) * (lines[1] - lines[0]) > MOST_FETCHED {
-            return;
-        }
-        let width = self.plane_image.width;
-        let mut read = 0;
-        for line in (lines[0]..lines[1]).map(|line| line * width) {
-            let pixels = line + columns[0]..line + columns[1];
-            for plane in self.plane_image.planes[pixels.clone()].iter().step_by(CACHE_LINE / size_of::<Plane>()) {
-                read |= plane.offset.to_bits();
-            }
-            if let Some(ColourData::Rgb8(data)) = self.colour.as_ref().filter(|c| c.is_aligned).map(|c| c.data)
-                && let Some(pixels) = data.get(3 * pixels.start..3 * pixels.end)
-            {
-                for &byte in pixels.iter().step_by(CACHE_LINE) {
-                    read |= u32::from(byte);
-                }
-            }
-        }
-        black_box(read);
     }
 
     #[inline(always)]
@@ -217,13 +184,20 @@ impl<'a> Frame<'a> {
         let ([least, most], ends) = (bounds.bounds, [min(end, 0.0), max(end, 0.0)]);
         let mut counts = LaneCounts::default();
         for z in 0..SIDE {
+            let (mut rows, mut near, mut beside) = ([[0.0; SIDE]; 3], [0; SIDE], [0; SIDE]);
             for y in 0..SIDE {
+                for k in 0..3 {
+                    rows[k][y] = (start[k] + sy[k] * y as f32) + sz[k] * z as f32;
+                }
                 let along = bounds.start + bounds.step[1] * y as f32 + bounds.step[2] * z as f32;
-                let row = (start + sy * y as f32) + sz * z as f32;
-                let beside = RIMS && row.z + ends[1] >= bounds.rims[0] && row.z + ends[0] <= bounds.rims[1];
-                let near = along >= least && along <= most;
+                near[y] = mask(along >= least) & mask(along <= most);
+                let depth = rows[2][y];
+                beside[y] = mask(depth + ends[1] >= bounds.rims[0]) & mask(depth + ends[0] <= bounds.rims[1]);
+            }
+            for y in 0..SIDE {
+                let (near, beside) = (near[y] != 0, RIMS && beside[y] != 0);
                 if near || beside {
-                    let lanes = self.project(&row, &offsets);
+                    let lanes = self.project(rows.map(|row| row[y]), &offsets);
                     if !near && lanes.index.iter().all(|&pixel| self.plane_image.rims.rims[pixel as usize] == Rim::NONE)
                     {
                         continue;
@@ -240,7 +214,7 @@ impl<'a> Frame<'a> {
     }
 
     #[inline(always)]
-    fn project(&self, row: &Vector3<f32>, offsets: &RowOffsets) -> ProjectedVoxels {
+    fn project(&self, row: [f32; 3], offsets: &RowOffsets) -> ProjectedVoxels {
         let zero = [0.0; LANES];
         let mut out = ProjectedVoxels {
             inside: [0; LANES],
@@ -252,10 +226,10 @@ impl<'a> Frame<'a> {
             dv: zero,
         };
         for x in 0..LANES {
-            let z = row.z + offsets.depth[x];
+            let z = row[2] + offsets.depth[x];
             let inverse = 1.0 / z;
-            let u = (row.x + offsets.u[x]) * inverse;
-            let v = (row.y + offsets.v[x]) * inverse;
+            let u = (row[0] + offsets.u[x]) * inverse;
+            let v = (row[1] + offsets.v[x]) * inverse;
             let (i, j) = ((u + ROUNDER) - ROUNDER, (v + ROUNDER) - ROUNDER);
             (out.depth[x], out.u[x], out.v[x], out.du[x], out.dv[x]) = (z, u, v, u - i, v - j);
             let inside =
@@ -288,11 +262,10 @@ impl<'a> Frame<'a> {
         lanes: &ProjectedVoxels,
         counts: &mut LaneCounts,
     ) {
+        let planes = lanes.index.map(|index| &self.plane_image.planes[index.cast_unsigned() as usize]);
         let [mut offset, mut omega, mut slope_u, mut slope_v] = [[0.0; LANES]; 4];
         for x in 0..LANES {
-            let plane = &self.plane_image.planes[lanes.index[x] as usize];
-            (offset[x], omega[x]) = (plane.offset, plane.scaled_omega);
-            [slope_u[x], slope_v[x]] = plane.scaled_slope;
+            (offset[x], omega[x]) = (planes[x].offset, planes[x].scaled_omega);
         }
         let (mut touched, mut own) = ([0; LANES], [0; LANES]);
         for x in 0..LANES {
@@ -317,6 +290,10 @@ impl<'a> Frame<'a> {
         }
         if touched == [0; LANES] {
             return;
+        }
+        // Most rows end before this.
+        for x in 0..LANES {
+            [slope_u[x], slope_v[x]] = planes[x].scaled_slope;
         }
         let sums = &mut block.distance.as_chunks_mut::<LANES>().0[row];
         let totals = &mut block.weight.as_chunks_mut::<LANES>().0[row];

@@ -16,8 +16,9 @@ use crate::integration::plane::Plane;
 use crate::integration::plane_tile::{TILE, Tile};
 use crate::integration::plane_windows::{BEND_VARIANCE, BENDING, COUNT, ROUGHNESS, Row, SPREAD, Windows};
 use crate::integration::rims::RimImage;
+use crate::integration::voxel_lanes::mask;
 use crate::parallel::in_chunks;
-use crate::rounding::ROUNDER;
+use crate::rounding::{ROUNDER, max, min};
 use crate::settings::Settings;
 use crate::widest::{self, Work};
 
@@ -120,9 +121,10 @@ impl PlaneImage {
         self.rims.find(self.width, &self.omegas, edges, &depth.intrinsics, settings);
         let across = self.width.div_ceil(TILE);
         for &pixel in &self.rims.beside {
-            let (pixel, z) = (pixel as usize, self.rims.rims[pixel as usize].depth());
-            let range = &mut self.tiles[pixel / self.width / TILE * across + pixel % self.width / TILE].rims;
-            *range = [range[0].min(z), range[1].max(z)];
+            let (z, v) = (self.rims.rims[pixel as usize].depth(), pixel / self.width as u32);
+            let u = pixel - v * self.width as u32;
+            let range = &mut self.tiles[v as usize / TILE * across + u as usize / TILE].rims;
+            *range = [min(range[0], z), max(range[1], z)];
         }
         let sources = self.rims.sources.iter().map(|&pixel| {
             let pixel = pixel as usize;
@@ -252,15 +254,23 @@ fn read_edges(
     let is_edge = |measured: f32, smooth: f32| (measured > 0.0) & smooth.is_nan();
     out.edges.clear();
     for (first, (measured, smooth)) in (0..).step_by(SCAN).zip(row.measured.chunks(SCAN).zip(row.smooth.chunks(SCAN))) {
-        let pixels = || measured.iter().zip(smooth).map(|(&measured, &smooth)| is_edge(measured, smooth));
-        if pixels().fold(false, |any, is_edge| any | is_edge) {
-            out.edges.extend((first..).zip(pixels()).filter(|&(_, is_edge)| is_edge).map(|(u, _)| u));
+        if let (Some(measured), Some(smooth)) = (measured.first_chunk::<SCAN>(), smooth.first_chunk::<SCAN>()) {
+            let mut any = 0;
+            for k in 0..SCAN {
+                any |= mask(is_edge(measured[k], smooth[k]));
+            }
+            if any == 0 {
+                continue;
+            }
         }
+        let pixels = (first..).zip(measured.iter().zip(smooth));
+        out.edges.extend(pixels.filter(|&(_, (&measured, &smooth))| is_edge(measured, smooth)).map(|(u, _)| u));
     }
     for group in out.edges.chunks(partial_window::LANES) {
         let [along, down] = partial.slopes(row.wide, std::array::from_fn(|k| *group.get(k).unwrap_or(&group[0])));
         for (k, &u) in group.iter().enumerate().filter(|&(k, _)| !along[k].is_nan()) {
             let seen = observe(lens, noise, u, row.measured[u], [along[k], down[k]]);
+            // Rounded as the plane keeps it.
             (out.offset[u], omegas[u]) = (seen.offset, seen.offset * seen.omega / seen.offset);
             (out.slope[0][u], out.slope[1][u]) = (seen.slope_u, seen.slope_v);
             found(u);

@@ -18,6 +18,8 @@ pub(crate) struct Tile {
     pub(crate) near: f32,
     /// Largest depth, metres; below `near` in a square without fused pixels.
     pub(crate) far: f32,
+    /// Least and largest inverse depth, 1/m.
+    range: [f32; 2],
     /// Their inverse depths, 1/m, are within `error` of this linear function.
     pub(crate) omega: Linear,
     pub(crate) error: f32,
@@ -43,8 +45,14 @@ impl Linear {
 }
 
 impl Tile {
-    pub(crate) const EMPTY: Self =
-        Self { near: f32::INFINITY, far: 0.0, omega: Linear { base: 0.0, slope: [0.0; 2] }, error: 0.0, rims: NO_RIMS };
+    pub(crate) const EMPTY: Self = Self {
+        near: f32::INFINITY,
+        far: 0.0,
+        range: [f32::INFINITY, 0.0],
+        omega: Linear { base: 0.0, slope: [0.0; 2] },
+        error: 0.0,
+        rims: NO_RIMS,
+    };
 
     /// Describes the square whose first pixel is `at`, from the lines of pixels that it is in, of an image with this width.
     #[inline(always)]
@@ -53,16 +61,20 @@ impl Tile {
         let mut square = [[0.0; TILE]; TILE];
         let columns = at[0]..(at[0] + TILE).min(width);
         for (line, omegas) in square.iter_mut().zip(omegas.chunks_exact(width)) {
-            line[..columns.len()].copy_from_slice(&omegas[columns.clone()]);
+            let omegas = &omegas[columns.clone()];
+            match omegas.first_chunk() {
+                Some(whole) => *line = *whole,
+                None => line[..omegas.len()].copy_from_slice(omegas),
+            }
         }
         let (mut low, mut high) = ([f32::INFINITY; TILE], [0.0; TILE]);
         for line in &square {
-            for (&omega, (low, high)) in line.iter().zip(low.iter_mut().zip(&mut high)) {
-                *low = min(if omega > 0.0 { omega } else { f32::INFINITY }, *low);
-                *high = max(omega, *high);
+            for k in 0..TILE {
+                low[k] = min(if line[k] > 0.0 { line[k] } else { f32::INFINITY }, low[k]);
+                high[k] = max(line[k], high[k]);
             }
         }
-        let (low, high) = (low.into_iter().fold(f32::INFINITY, min), high.into_iter().fold(0.0, max));
+        let (low, high) = (fold(low, min), fold(high, max));
         if high <= 0.0 {
             return Self::EMPTY;
         }
@@ -73,15 +85,15 @@ impl Tile {
             Some(omega) => Linear::through(omega, plane.scaled_slope.map(|s| s / plane.offset), [u, at[1] + v]),
             None => Linear { base: f32::midpoint(low, high), slope: [0.0; 2] },
         };
+        let [left, above] = at.map(|k| k as f32);
         let mut error = [0.0; TILE];
-        for (line, v) in square.iter().zip(at[1]..) {
-            for (k, (&value, error)) in line.iter().zip(&mut error).enumerate() {
-                let off = (value - omega.at((at[0] + k) as f32, v as f32)).abs();
-                *error = max(if value > 0.0 { off } else { 0.0 }, *error);
+        for (v, line) in square.iter().enumerate() {
+            for k in 0..TILE {
+                let off = (line[k] - omega.at(left + k as f32, above + v as f32)).abs();
+                error[k] = max(if line[k] > 0.0 { off } else { 0.0 }, error[k]);
             }
         }
-        let error = error.into_iter().fold(0.0, max);
-        Self { near: 1.0 / high, far: 1.0 / low, omega, error, rims: NO_RIMS }
+        Self { near: 1.0 / high, far: 1.0 / low, range: [low, high], omega, error: fold(error, max), rims: NO_RIMS }
     }
 
     /// How far its inverse depths are from a linear function, at least and at most; it is the square at this column and line.
@@ -95,13 +107,13 @@ impl Tile {
         let by_plane = self.error + half * (own[0].abs() + own[1].abs());
         let off = self.omega.at(u, v) - middle;
         let by_range = half * (other.slope[0].abs() + other.slope[1].abs());
-        [
-            max(off - by_plane, 1.0 / self.far - middle - by_range),
-            min(off + by_plane, 1.0 / self.near - middle + by_range),
-        ]
+        [max(off - by_plane, self.range[0] - middle - by_range), min(off + by_plane, self.range[1] - middle + by_range)]
     }
+}
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.far < self.near
-    }
+/// What is left of a row of values, two of which are made one again and again.
+#[inline(always)]
+fn fold(values: [f32; TILE], one: impl Fn(f32, f32) -> f32) -> f32 {
+    let four: [f32; 4] = std::array::from_fn(|k| one(values[k], values[k + 4]));
+    one(one(four[0], four[2]), one(four[1], four[3]))
 }

@@ -41,8 +41,9 @@ impl Rim {
 
     /// The nearer one of two; of two as near, that of the nearer surface.
     fn is_nearer(self, other: Self) -> bool {
-        let key = |rim: Self| (rim.pixels(), rim.0);
-        other == Self::NONE || key(self) < key(other)
+        // The pixels come first, and none is the farthest.
+        let key = |rim: Self| rim.0.rotate_right(PIXEL_BITS.count_ones()).wrapping_sub(1);
+        key(self) < key(other)
     }
 }
 
@@ -81,29 +82,6 @@ struct Start {
     /// Inverse depth of the rim, 1/m.
     omega: f32,
     pixels: u32,
-}
-
-impl Rule<'_> {
-    /// Goes from a pixel in steps along an axis, as far as there is room, and calls `found` with each pixel that shows a
-    /// surface behind the rim, until it says that this is known.
-    fn walk(&self, start: Start, (step, room): (isize, usize), axis: usize, mut found: impl FnMut(usize, Rim) -> bool) {
-        let Start { at, omega, pixels } = start;
-        let (granted, slope) = (GRANTED * self.noise.sigma_inverse(omega), self.steepest[axis] * omega);
-        let voxel = self.voxel * omega;
-        let most = ((FRONT as f32 * self.pixels * omega) as u32 + 1).min(PIXEL_BITS).min(room as u32);
-        let (mut at, depth) = (at as usize, 1.0 / omega);
-        for n in 1..=most {
-            at = at.wrapping_add_signed(step);
-            let there = self.omegas[at];
-            if there <= 0.0 {
-                continue;
-            }
-            let (by_noise, by_depth, behind) = (granted + slope * n as f32, voxel * there, omega - there);
-            if !(behind > by_noise && behind > by_depth && found(at, Rim::new(depth, n.max(pixels)))) {
-                break;
-            }
-        }
-    }
 }
 
 impl RimImage {
@@ -154,22 +132,34 @@ impl RimImage {
         }
     }
 
-    /// Leaves the rim in what lies behind it along an axis.
+    /// Goes from a pixel in steps along an axis, as far as there is room, and leaves the rim in each pixel that shows a surface
+    /// behind it, until this is known.
     fn leave(&mut self, rule: &Rule, start: Start, ways: [(isize, usize); 2], axis: usize) {
-        let Self { rims, beside, .. } = self;
-        for way in ways {
-            rule.walk(start, way, axis, |at, rim| {
-                let known = &mut rims[at];
-                // One that is nearer is so all the way from here.
-                let is_nearer = rim.is_nearer(*known);
-                if is_nearer {
-                    if *known == Rim::NONE {
-                        beside.push(at as u32);
-                    }
-                    *known = rim;
+        let Start { at, omega, pixels } = start;
+        let (granted, slope) = (GRANTED * rule.noise.sigma_inverse(omega), rule.steepest[axis] * omega);
+        let (voxel, depth) = (rule.voxel * omega, 1.0 / omega);
+        let most = ((FRONT as f32 * rule.pixels * omega) as u32 + 1).min(PIXEL_BITS);
+        for (step, room) in ways {
+            let (mut at, mut n, last) = (at as usize, 0, most.min(room as u32));
+            while n < last {
+                n += 1;
+                at = at.wrapping_add_signed(step);
+                let there = rule.omegas[at];
+                // What lies there is unknown.
+                if there <= 0.0 {
+                    continue;
                 }
-                is_nearer
-            });
+                let behind = omega - there;
+                let (rim, known) = (Rim::new(depth, n.max(pixels)), &mut self.rims[at]);
+                // One that is nearer is so all the way from here.
+                if !(behind > granted + slope * n as f32 && behind > voxel * there && rim.is_nearer(*known)) {
+                    break;
+                }
+                if *known == Rim::NONE {
+                    self.beside.push(at as u32);
+                }
+                *known = rim;
+            }
         }
     }
 }

@@ -344,8 +344,8 @@ fn partials(frame: &Frame, keys: &mut [BlockKey], threads: usize) -> Vec<Partial
         for &mut key in keys {
             let count = frame.apply(Operation::Integrate, key, &mut blank);
             if count.voxels > 0 {
-                part.push(PartialBlock { key, block: blank.clone(), voxels: count.voxels });
-                *blank = VoxelBlock::ZERO;
+                let block = std::mem::replace(&mut blank, Box::new(VoxelBlock::ZERO));
+                part.push(PartialBlock { key, block, voxels: count.voxels });
             }
         }
         part
