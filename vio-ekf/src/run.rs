@@ -16,7 +16,6 @@ mod summary;
 
 pub use calibration_check::check_calibration;
 pub use calibration_doubt::{CalibrationDoubt, CalibrationPart};
-
 pub use evaluation::{AlignedPair, GroundTruth, PoseError, RunEvaluation, evaluate_run};
 pub use frames::{Picture, RecordedFrame, pair_by_stamp};
 pub use outcome::{Event, ImageOutcome, Loss, LossReason, SkipReason, SkippedImage};
