@@ -1,7 +1,7 @@
 //! The depth camera that looks at a world.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics, NoiseModel};
 
 use super::world::{Seen, World};
 use crate::Rng;
@@ -30,6 +30,12 @@ pub struct Shot {
 }
 
 impl DepthCamera {
+    /// Its noise as its maker states it: where it has none, its values are rounded by half a step at most.
+    pub(super) fn noise_model(&self) -> NoiseModel {
+        let [base, quadratic] = self.noise;
+        NoiseModel { base: base.max(0.5 / SCALE), quadratic, nearest: 0.4 }
+    }
+
     pub(super) fn shot(&self, world: &World, pose: &Isometry3<f64>, seed: u64, threads: usize) -> Shot {
         let [width, height] = self.size;
         let (mut depth, mut rgb) = (vec![0; width * height], vec![0; 3 * width * height]);

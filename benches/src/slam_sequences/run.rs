@@ -164,7 +164,8 @@ pub fn run(sequence: &Sequence, limits: &Limits, see: See) -> Result<Figures, An
 fn settings(sequence: &Sequence, limits: &Limits) -> SlamSettings {
     let memory = MemoryLimits { host_bytes: limits.active_bytes.map_or(0, |_| 8 << 30), ..MemoryLimits::default() };
     let max_bytes = limits.active_bytes.unwrap_or(8 << 30);
-    let map = Settings { voxel_size: limits.voxel, max_bytes, memory, threads: limits.threads, ..Settings::default() };
+    let (Limits { voxel: voxel_size, threads, .. }, noise) = (*limits, sequence.camera.noise_model());
+    let map = Settings { voxel_size, max_bytes, memory, threads, noise, ..Settings::default() };
     SlamSettings {
         map,
         frame_interval: 1.0 / sequence.rate,

@@ -40,7 +40,7 @@ pub(super) struct Solution {
     /// The eliminated unknowns of the points.
     eliminated: Vec<EliminatedPoint>,
     sigma: f64,
-    /// Errors of the global unknowns by changes of velocity that the samples do not show...
+    /// Of a minimum: errors of the global unknowns by changes of velocity that the samples do not show...
     pub(super) by_changes: SMatrix<f64, GLOBAL, NOISE>,
     /// ... and of each point, those of the global ones apart.
     points_by_changes: Vec<SMatrix<f64, 3, NOISE>>,
@@ -109,7 +109,11 @@ pub(super) fn refine(
     let information = prior(&global).0 + equations.matrix * sigma.powi(-2);
     let point_errors = equations.point_errors.iter().map(|m| m * window.input.focal_length).collect();
     let covariance = information.cholesky()?.inverse();
-    let (pull, points_by_changes) = pull_of_changes(window, kept, &global, &points, (&equations.eliminated, huber))?;
+    let (pull, points_by_changes) = if converged {
+        pull_of_changes(window, kept, &global, &points, (&equations.eliminated, huber))?
+    } else {
+        Default::default()
+    };
     Some(Solution {
         by_changes: covariance * pull * sigma.powi(-2),
         points_by_changes,

@@ -21,7 +21,7 @@ pub(crate) struct InitialMotion {
     pub(crate) core: SMatrix<f64, { error_state::CORE }, ERRORS>,
     /// The points that the last image sees.
     pub(crate) landmarks: Vec<InitialDistance>,
-    /// Relative standard deviation of the scale.
+    /// Relative standard deviation of the scale, the noise of the samples apart.
     pub(crate) scale_sigma: f64,
     /// Length of the window, s.
     pub(crate) duration: f64,

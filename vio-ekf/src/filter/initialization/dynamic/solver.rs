@@ -156,8 +156,10 @@ fn at_last_image(window: &InitializationWindow, kept: &[usize], found: &Solution
     covariance.fixed_view_mut::<GLOBAL, GLOBAL>(0, 0).copy_from(&found.covariance);
 
     let landmarks = found.distances_at_last_image(window, kept);
+    // As the images know it: what the samples' noise adds is claimed, but no longer window would know it better.
     let scale = |landmark: &InitialDistance| {
-        landmark.gradient.dot(&(covariance * landmark.gradient)).sqrt() / landmark.inverse_distance
+        let by_unknowns = landmark.gradient.fixed_rows::<GLOBAL>(0);
+        by_unknowns.dot(&(found.covariance * by_unknowns)).sqrt() / landmark.inverse_distance
     };
     let scales: Vec<f64> = landmarks.iter().map(scale).collect();
     InitialMotion {

@@ -165,25 +165,31 @@ fn exact_directions_give_the_exact_motion() {
 
 #[test]
 fn noise_is_within_what_is_claimed() {
-    claims(0.0, 54);
+    claims(0.4, 0.0, 54);
 }
 
-/// An accelerometer ten times as noisy as that of EuRoC: the scale is known later, and to what is claimed.
+/// An accelerometer ten times as noisy as that of EuRoC.
 #[test]
 fn noise_of_the_samples_is_within_what_is_claimed() {
-    claims(0.02, 30);
+    claims(0.4, 0.02, 54);
 }
 
-fn claims(accel_density: f64, least: usize) {
+/// An accelerometer that vibrates as flying ones do, in gentle motion. Waiting does not help: of a longer window it tells less.
+#[test]
+fn noise_of_the_samples_keeps_nothing_from_starting() {
+    claims(0.05, 0.02, 54);
+}
+
+fn claims(agility: f64, accel_density: f64, least: usize) {
     let (mut started, mut squares) = (0, [0.0; 4]);
     for seed in 0..60 {
-        let (found, truth) = window((0.5, 0.4), BIASES, (0.3, accel_density), Mistaken::None, seed);
+        let (found, truth) = window((0.5, agility), BIASES, (0.3, accel_density), Mistaken::None, seed);
         let Some(found) = converged(found) else { continue };
         started += 1;
         let covariance = found.core * found.covariance * found.core.transpose();
         let off = errors(&found, &truth);
         let scale = off.fixed_rows::<3>(error_state::VELOCITY).norm() / truth.velocity.norm();
-        assert!(scale < 0.2, "{seed}: {scale}");
+        assert!(scale < 0.25, "{seed}: {scale}");
         let square = |row: usize, count: usize| {
             let block: nalgebra::DMatrix<f64> = covariance.view((row, row), (count, count)).into_owned();
             let off: nalgebra::DVector<f64> = off.rows(row, count).into_owned();
