@@ -72,6 +72,36 @@ pub trait DenseMap: TsdfLayer {
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error>;
 
+    /// Fuses a frame of unknown time in blocks that have room for it, as [`Map::integrate_where_room`]; a map that has no such limit has
+    /// none that are full.
+    ///
+    /// # Errors
+    /// As [`Map::integrate_where_room`].
+    fn integrate_where_room(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+        full: &mut Vec<[i32; 3]>,
+    ) -> Result<FrameReport, Error> {
+        full.clear();
+        self.integrate(depth, colour, world_from_camera)
+    }
+
+    /// Takes out a frame that found these blocks full, as [`Map::deintegrate_except`].
+    ///
+    /// # Errors
+    /// As [`Map::deintegrate_except`].
+    fn deintegrate_except(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+        _full: &[[i32; 3]],
+    ) -> Result<FrameReport, Error> {
+        self.deintegrate(depth, colour, world_from_camera)
+    }
+
     /// What a camera sees of the surface that is in active memory, as [`Map::ray_cast`].
     ///
     /// # Errors
@@ -189,6 +219,26 @@ impl DenseMap for Map {
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
         Map::deintegrate(self, depth, colour, world_from_camera)
+    }
+
+    fn integrate_where_room(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+        full: &mut Vec<[i32; 3]>,
+    ) -> Result<FrameReport, Error> {
+        Map::integrate_where_room(self, depth, colour, world_from_camera, full)
+    }
+
+    fn deintegrate_except(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+        full: &[[i32; 3]],
+    ) -> Result<FrameReport, Error> {
+        Map::deintegrate_except(self, depth, colour, world_from_camera, full)
     }
 
     fn ray_cast(

@@ -26,7 +26,7 @@ use crate::ray_cast::view::View;
 use crate::report::{FrameReport, MemoryUsage};
 use crate::settings::{MemoryLimits, Settings};
 use crate::storage::block_storage::{BlockStorage, Transfers};
-use crate::storage::frame_update::{FrameJob, apply_frame};
+use crate::storage::frame_update::{FrameJob, PassedOver, apply_frame};
 use crate::storage::merge_policy::{MergeDecision, MergePolicy};
 use crate::storage::reloaded::ReloadedBlocks;
 use crate::storage::swap_file::SwapFile;
@@ -131,7 +131,26 @@ impl Map {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.integrate_then(self.clock.next(), depth, colour, world_from_camera)
+        self.integrate_then(self.clock.next(), depth, colour, world_from_camera, &mut PassedOver::default())
+    }
+
+    /// [`integrate`](Self::integrate), but blocks whose voxels have no room for another observation take nothing: a camera that looks at one
+    /// place for long does not keep the map from what else it sees. They are put into `full`, in place of what was there, for
+    /// [`deintegrate_except`](Self::deintegrate_except).
+    ///
+    /// # Errors
+    /// As [`integrate`](Self::integrate), but never [`Error::Saturated`].
+    pub fn integrate_where_room(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+        full: &mut Vec<[i32; 3]>,
+    ) -> Result<FrameReport, Error> {
+        let mut passed_over = PassedOver::growing();
+        let report = self.integrate_then(self.clock.next(), depth, colour, world_from_camera, &mut passed_over)?;
+        passed_over.write(full);
+        Ok(report)
     }
 
     /// [`integrate`](Self::integrate) of a frame that was taken at `time`, seconds: what decides which blocks are old.
@@ -146,7 +165,7 @@ impl Map {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.integrate_then(self.clock.at(time)?, depth, colour, world_from_camera)
+        self.integrate_then(self.clock.at(time)?, depth, colour, world_from_camera, &mut PassedOver::default())
     }
 
     fn integrate_then(
@@ -155,8 +174,10 @@ impl Map {
         depth: &DepthView,
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
+        passed_over: &mut PassedOver,
     ) -> Result<FrameReport, Error> {
-        let report = self.apply(Operation::Integrate, depth, colour, world_from_camera, clock.time())?;
+        let views = (depth, colour, world_from_camera);
+        let report = self.apply(Operation::Integrate, views, clock.time(), passed_over)?;
         self.clock = clock;
         Ok(report)
     }
@@ -174,23 +195,38 @@ impl Map {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.apply(Operation::Deintegrate, depth, colour, world_from_camera, self.clock.time())
+        self.deintegrate_except(depth, colour, world_from_camera, &[])
+    }
+
+    /// Takes out a frame that was fused by [`integrate_where_room`](Self::integrate_where_room), which said that these blocks were full.
+    ///
+    /// # Errors
+    /// As [`deintegrate`](Self::deintegrate).
+    pub fn deintegrate_except(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+        full: &[[i32; 3]],
+    ) -> Result<FrameReport, Error> {
+        let views = (depth, colour, world_from_camera);
+        self.apply(Operation::Deintegrate, views, self.clock.time(), &mut PassedOver::new(full))
     }
 
     fn apply(
         &mut self,
         operation: Operation,
-        depth: &DepthView,
-        colour: Option<&ColourView>,
-        world_from_camera: &Isometry3<f64>,
+        (depth, colour, world_from_camera): (&DepthView, Option<&ColourView>, &Isometry3<f64>),
         time: f64,
+        passed_over: &mut PassedOver,
     ) -> Result<FrameReport, Error> {
         span!("apply_frame");
         let frame = Frame::read(&mut self.plane_image, depth, colour, world_from_camera, &self.settings)?;
         let camera = world_from_camera.translation.vector / self.settings.block_size();
         let job = FrameJob { frame: &frame, operation, time, camera: camera.into(), threads: self.settings.threads };
         self.storage.begin_call();
-        let change = apply_frame(&mut self.storage, job, &frame.plane_image.keys)?;
+        let storage = &mut self.storage;
+        let change = passed_over.apply(&frame.plane_image.keys, |keys| apply_frame(storage, job, keys))?;
         let transfers = match operation {
             Operation::Integrate => self.storage.transfer(&change.touched, time),
             Operation::Deintegrate => Transfers::default(),

@@ -20,11 +20,11 @@ use crate::file::writer;
 use crate::frame_clock::FrameClock;
 use crate::gpu::cast::Caster;
 use crate::gpu::device::Device;
-use crate::gpu::fuse::{Fuser, Mode, Pass};
+use crate::gpu::fuse::{Fuser, Mode, Pass, UpdateCount};
 use crate::gpu::options::GpuOptions;
 use crate::gpu::probe;
 use crate::gpu::split::{Split, mode, touched};
-use crate::gpu::tiers::Tiers;
+use crate::gpu::tiers::{Elsewhere, Tiers};
 use crate::images::{ColourView, DepthView, Intrinsics};
 use crate::integration::integrator::{Frame, Operation};
 use crate::integration::plane_image::PlaneImage;
@@ -37,7 +37,7 @@ use crate::ray_cast::view::View;
 use crate::report::{FrameReport, MemoryUsage};
 use crate::settings::{MemoryLimits, Settings};
 use crate::storage::block_storage::BlockStorage;
-use crate::storage::frame_update::FrameJob;
+use crate::storage::frame_update::{FrameJob, PassedOver, Refusal};
 
 /// A map whose blocks lie on a GPU. It equals, to the bit, a [`Map`] that was given the same frames.
 ///
@@ -139,8 +139,10 @@ impl GpuMap {
         depth: &DepthView,
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
+        passed_over: &mut PassedOver,
     ) -> Result<FrameReport, Error> {
-        let report = self.apply(Operation::Integrate, depth, colour, world_from_camera, clock.time())?;
+        let views = (depth, colour, world_from_camera);
+        let report = self.apply(Operation::Integrate, views, clock.time(), passed_over)?;
         self.tiers.host.clock = clock;
         Ok(report)
     }
@@ -148,10 +150,9 @@ impl GpuMap {
     fn apply(
         &mut self,
         operation: Operation,
-        depth: &DepthView,
-        colour: Option<&ColourView>,
-        world_from_camera: &Isometry3<f64>,
+        (depth, colour, world_from_camera): (&DepthView, Option<&ColourView>, &Isometry3<f64>),
         time: f64,
+        passed_over: &mut PassedOver,
     ) -> Result<FrameReport, Error> {
         let Self { tiers, fuser, plane_image, .. } = self;
         let settings = *tiers.host.settings();
@@ -159,25 +160,9 @@ impl GpuMap {
         let camera = world_from_camera.translation.vector / settings.block_size();
         let job = FrameJob { frame: &frame, operation, time, camera: camera.into(), threads: settings.threads };
         tiers.host.storage.begin_call();
-        let split = Split::new(&tiers.pool, &frame.plane_image.keys);
         fuser.load(&tiers.device, &frame)?;
-        // One submission counts in the blocks that are not here and changes those that are: waiting costs more than undoing.
-        let (absent, present) = (split.count(), split.update(mode(operation)));
-        let passes: Vec<Pass> = std::iter::once(absent).chain(present).collect();
-        let counts = fuser.run(&tiers.device, &tiers.pool, &frame, &passes)?;
-        let (counted, updated) = counts.split_at(split.absent.len());
-        let needed = touched(split.absent.iter(), counted);
-        let changed = touched(split.present.iter().flatten(), updated);
-        let elsewhere = match tiers.admit(job, &changed, &needed) {
-            Ok(elsewhere) => elsewhere,
-            Err(refusal) => {
-                // Wrapping sums form a group: the opposite update restores every bit. What was evicted to make room was not touched.
-                let passes: Vec<Pass> = split.update(mode(operation.opposite())).collect();
-                let undone = fuser.submit(&tiers.device, &tiers.pool, &frame, &passes);
-                undone.map_err(|error| tiers.device.lose(error))?;
-                return Err(refusal);
-            }
-        };
+        let Applied { needed, changed, elsewhere } =
+            passed_over.apply(&frame.plane_image.keys, |keys| try_to_apply(tiers, fuser, job, keys))?;
         let history = tiers.host.storage.new_history(time);
         let added = Split::added(&mut tiers.pool, &elsewhere.fresh, history);
         let passes: Vec<Pass> = added.update(Mode::Integrate).collect();
@@ -200,6 +185,34 @@ impl GpuMap {
             blocks_reloaded,
             blocks_timed_out: 0,
         })
+    }
+}
+
+/// A frame in the blocks on the device, and what it needs besides.
+struct Applied {
+    needed: Vec<(BlockKey, UpdateCount)>,
+    changed: Vec<(BlockKey, UpdateCount)>,
+    elsewhere: Elsewhere,
+}
+
+fn try_to_apply(tiers: &mut Tiers, fuser: &mut Fuser, job: FrameJob, keys: &[BlockKey]) -> Result<Applied, Refusal> {
+    let split = Split::new(&tiers.pool, keys);
+    // One submission counts in the blocks that are not here and changes those that are: waiting costs more than undoing.
+    let (absent, present) = (split.count(), split.update(mode(job.operation)));
+    let passes: Vec<Pass> = std::iter::once(absent).chain(present).collect();
+    let counts = fuser.run(&tiers.device, &tiers.pool, job.frame, &passes)?;
+    let (counted, updated) = counts.split_at(split.absent.len());
+    let needed = touched(split.absent.iter(), counted);
+    let changed = touched(split.present.iter().flatten(), updated);
+    match tiers.admit(job, &changed, &needed) {
+        Ok(elsewhere) => Ok(Applied { needed, changed, elsewhere }),
+        Err(refusal) => {
+            // Wrapping sums form a group: the opposite update restores every bit. What was evicted to make room was not touched.
+            let passes: Vec<Pass> = split.update(mode(job.operation.opposite())).collect();
+            let undone = fuser.submit(&tiers.device, &tiers.pool, job.frame, &passes);
+            undone.map_err(|error| tiers.device.lose(error))?;
+            Err(refusal)
+        }
     }
 }
 
@@ -260,7 +273,7 @@ impl DenseMap for GpuMap {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.integrate_then(self.tiers.host.clock.next(), depth, colour, world_from_camera)
+        self.integrate_then(self.tiers.host.clock.next(), depth, colour, world_from_camera, &mut PassedOver::default())
     }
 
     fn integrate_at(
@@ -270,7 +283,13 @@ impl DenseMap for GpuMap {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.integrate_then(self.tiers.host.clock.at(time)?, depth, colour, world_from_camera)
+        self.integrate_then(
+            self.tiers.host.clock.at(time)?,
+            depth,
+            colour,
+            world_from_camera,
+            &mut PassedOver::default(),
+        )
     }
 
     fn deintegrate(
@@ -279,7 +298,33 @@ impl DenseMap for GpuMap {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.apply(Operation::Deintegrate, depth, colour, world_from_camera, self.tiers.host.clock.time())
+        self.deintegrate_except(depth, colour, world_from_camera, &[])
+    }
+
+    fn integrate_where_room(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+        full: &mut Vec<[i32; 3]>,
+    ) -> Result<FrameReport, Error> {
+        let mut passed_over = PassedOver::growing();
+        let clock = self.tiers.host.clock.next();
+        let report = self.integrate_then(clock, depth, colour, world_from_camera, &mut passed_over)?;
+        passed_over.write(full);
+        Ok(report)
+    }
+
+    fn deintegrate_except(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+        full: &[[i32; 3]],
+    ) -> Result<FrameReport, Error> {
+        let views = (depth, colour, world_from_camera);
+        let time = self.tiers.host.clock.time();
+        self.apply(Operation::Deintegrate, views, time, &mut PassedOver::new(full))
     }
 
     fn ray_cast(

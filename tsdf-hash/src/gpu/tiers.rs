@@ -17,7 +17,7 @@ use crate::ray_cast::camera::Camera;
 use crate::ray_cast::unpacked::in_view;
 use crate::settings::Settings;
 use crate::storage::block_storage::hash_blocks;
-use crate::storage::frame_update::{FrameJob, apply_frame, refused};
+use crate::storage::frame_update::{FrameJob, Refusal, apply_frame};
 use crate::storage::victims;
 use crate::storage::view_reload::room_if_any;
 
@@ -132,21 +132,21 @@ impl Tiers {
         job: FrameJob,
         changed: &[(BlockKey, UpdateCount)],
         needed: &[(BlockKey, UpdateCount)],
-    ) -> Result<Elsewhere, Error> {
-        // The pages mix the keys, and the first of them is named.
-        if let Some(key) = changed.iter().filter(|work| work.1.overflow()).map(|work| work.0).min() {
-            return Err(refused(job.operation, key));
+    ) -> Result<Elsewhere, Refusal> {
+        let overflow: Vec<_> = changed.iter().filter(|work| work.1.overflow()).map(|work| work.0).collect();
+        if !overflow.is_empty() {
+            return Err(Refusal::of(job.operation, overflow));
         }
         self.touch(changed.iter().map(|work| work.0));
         let needed = needed.iter().map(|work| work.0);
         let (mut on_host, mut fresh): (Vec<_>, Vec<_>) = needed.partition(|&key| self.host.storage.contains(key));
         if let (Operation::Deintegrate, Some(&key)) = (job.operation, fresh.first()) {
-            return Err(refused(job.operation, key));
+            return Err(Refusal::of(job.operation, vec![key]));
         }
         let added = fresh.len();
         self.make_room(added, job.camera)?;
         if fresh.len() > self.pool.room() && !self.host.storage.evicted.is_enabled() {
-            return Err(self.pool.out_of_budget());
+            return Err(self.pool.out_of_budget().into());
         }
         on_host.extend(fresh.drain(self.pool.room().min(added)..));
         on_host.sort_unstable();

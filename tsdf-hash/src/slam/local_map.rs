@@ -59,7 +59,8 @@ impl LocalMap {
         let mut pose = self.world_from_maps.inverse() * world_from_camera;
         pose.rotation.renormalize();
         for map in &mut self.maps {
-            map.integrate(depth, colour, &pose)?;
+            // Nothing is taken out again.
+            map.integrate_where_room(depth, colour, &pose, &mut Vec::new())?;
         }
         Ok(())
     }

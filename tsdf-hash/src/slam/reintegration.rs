@@ -14,6 +14,8 @@ use crate::slam::frame_source::{FrameSource, read_again};
 pub(crate) struct Reintegration {
     /// Where the map has them; `None` of one that it does not have, because it could be taken out but not fused again.
     in_map: BTreeMap<usize, Option<Isometry3<f64>>>,
+    /// Blocks that were full when the map took a frame, of the few frames that met some.
+    full: BTreeMap<usize, Vec<[i32; 3]>>,
 }
 
 impl Reintegration {
@@ -21,6 +23,13 @@ impl Reintegration {
     pub(crate) fn moved(&mut self, frame: usize, from: Isometry3<f64>) {
         // Moved again before its turn came, it is still where it was fused.
         self.in_map.entry(frame).or_insert(Some(from));
+    }
+
+    /// These blocks were full when the map took a frame.
+    pub(crate) fn met_full(&mut self, frame: usize, blocks: Vec<[i32; 3]>) {
+        if !blocks.is_empty() {
+            self.full.insert(frame, blocks);
+        }
     }
 
     /// De-integrates at most so many frames where the map has them and integrates them where they belong, in the order of the recording, which
@@ -34,15 +43,20 @@ impl Reintegration {
     ) -> Result<usize, Error> {
         for done in 0..most {
             let Some(mut next) = self.in_map.first_entry() else { return Ok(done) };
-            let (number, to) = fused(*next.key());
+            let frame = *next.key();
+            let (number, to) = fused(frame);
             let images = read_again(source, number)?;
             let (depth, colour) = (images.depth(), images.colour());
             if let Some(from) = next.get() {
-                map.deintegrate(&depth, colour.as_ref(), from)?;
+                let full = self.full.get(&frame).map_or(&[][..], Vec::as_slice);
+                map.deintegrate_except(&depth, colour.as_ref(), from, full)?;
+                self.full.remove(&frame);
                 next.insert(None);
             }
-            map.integrate(&depth, colour.as_ref(), &to)?;
+            let mut full = Vec::new();
+            map.integrate_where_room(&depth, colour.as_ref(), &to, &mut full)?;
             next.remove();
+            self.met_full(frame, full);
         }
         Ok(most)
     }
@@ -56,7 +70,7 @@ mod tests {
     use crate::images::Intrinsics;
     use crate::map::Map;
     use crate::settings::Settings;
-    use crate::slam::frame_source::{DepthPixels, FrameImages};
+    use crate::slam::frame_source::{ColourImage, ColourPixels, DepthPixels, FrameImages};
 
     const FRAMES: usize = 6;
 
@@ -66,6 +80,11 @@ mod tests {
         let depth = DepthPixels::U16 { data: (0..80 * 60).map(wall).collect(), scale: 1000.0 };
         let intrinsics = Intrinsics { fx: 70.0, fy: 70.0, cx: 39.5, cy: 29.5 };
         FrameImages { width: 80, height: 60, depth, intrinsics, colour: None }
+    }
+
+    fn grey() -> ColourImage {
+        let intrinsics = Intrinsics { fx: 70.0, fy: 70.0, cx: 39.5, cy: 29.5 };
+        ColourImage { width: 80, height: 60, pixels: ColourPixels::Rgb8(vec![128; 3 * 80 * 60]), intrinsics }
     }
 
     fn poses(off: f64) -> Vec<Isometry3<f64>> {
@@ -100,5 +119,30 @@ mod tests {
         assert_eq!(reintegration.work(&mut map, &mut source, |k| (k, third[k]), usize::MAX).unwrap(), 3);
         assert_eq!(map.hash(), fused(&third).hash());
         assert_eq!(reintegration.work(&mut map, &mut source, |k| (k, third[k]), 9).unwrap(), 0);
+    }
+
+    /// A camera that stays for long: what its voxels have no room for is passed over, at the corrected poses as before.
+    #[test]
+    fn the_map_follows_where_it_is_full() {
+        let (stay, shot) = (1045, FrameImages { colour: Some(grey()), ..images(0) });
+        let (depth, colour) = (shot.depth(), shot.colour());
+        let [here, there] = [0.0, 0.03].map(|off| poses(off)[0]);
+        let taken = |pose: &Isometry3<f64>, reintegration: &mut Reintegration| {
+            let mut map = Map::new(Settings { voxel_size: 0.04, ..Settings::default() }).unwrap();
+            for k in 0..stay {
+                let mut full = Vec::new();
+                map.integrate_where_room(&depth, colour.as_ref(), pose, &mut full).unwrap();
+                assert_eq!(k >= 1040, !full.is_empty(), "{k}");
+                reintegration.met_full(k, full);
+            }
+            map
+        };
+        let mut reintegration = Reintegration::default();
+        let mut map = taken(&here, &mut reintegration);
+        (0..stay).for_each(|k| reintegration.moved(k, here));
+        let mut source = |_| Ok(shot.clone());
+        assert_eq!(reintegration.work(&mut map, &mut source, |k| (k, there), usize::MAX).unwrap(), stay);
+        assert_eq!(map.hash(), taken(&there, &mut Reintegration::default()).hash());
+        assert_eq!(reintegration.full.len(), stay - 1040);
     }
 }

@@ -289,7 +289,9 @@ impl<S: FrameSource> Slam<S> {
         pose: &Isometry3<f64>,
         events: &mut Vec<Event>,
     ) -> Result<Isometry3<f64>, Error> {
-        let (report, fusion_seconds) = if self.settings.fuse { self.fuse(depth, colour, pose)? } else { (None, None) };
+        let mut full = Vec::new();
+        let (report, fusion_seconds) =
+            if self.settings.fuse { self.fuse(depth, colour, pose, &mut full)? } else { (None, None) };
         if let Some(report) = &report {
             events.extend(self.quality.count(frame, depth.width * depth.height, report));
             self.count_bytes();
@@ -297,6 +299,7 @@ impl<S: FrameSource> Slam<S> {
                 events.extend(self.camera_doubt().map(Event::CameraDoubted));
             }
         }
+        self.reintegration.met_full(self.frames.len(), full);
         self.frames.push(frame);
         self.trajectory.push((stamp, *pose));
         events.push(Event::Placed(PlacedFrame { frame, stamp, world_from_camera: *pose, report, fusion_seconds }));
@@ -318,20 +321,21 @@ impl<S: FrameSource> Slam<S> {
         }
     }
 
-    /// Into the map, and into the local one; both or none. With the time of the former.
+    /// Into the map, and into the local one; both or none. With the time of the former, and the blocks that it found full.
     fn fuse(
         &mut self,
         depth: &DepthView,
         colour: Option<&ColourView>,
         pose: &Isometry3<f64>,
+        full: &mut Vec<[i32; 3]>,
     ) -> Result<(Option<FrameReport>, Option<f64>), Error> {
         let start = self.clock.map(|clock| clock());
-        let report = self.map.dense_mut().integrate(depth, colour, pose)?;
+        let report = self.map.dense_mut().integrate_where_room(depth, colour, pose, full)?;
         let seconds = self.clock.zip(start).map(|(clock, start)| clock() - start);
         if let Some(frontend) = &mut self.frontend
             && let Err(refusal) = frontend.fused(depth, colour, pose, self.backend.keyframes().len())
         {
-            self.map.dense_mut().deintegrate(depth, colour, pose)?;
+            self.map.dense_mut().deintegrate_except(depth, colour, pose, full)?;
             return Err(refusal);
         }
         Ok((Some(report), seconds))

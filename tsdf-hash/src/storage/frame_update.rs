@@ -54,16 +54,99 @@ struct FrameUpdate<'a> {
     change: FrameChange,
 }
 
+/// Why a frame is not applied.
+pub(crate) enum Refusal {
+    /// These blocks have no room for it; there may be others.
+    Full(Vec<BlockKey>),
+    Error(Error),
+}
+
+impl From<Error> for Refusal {
+    fn from(error: Error) -> Self {
+        Self::Error(error)
+    }
+}
+
+impl Refusal {
+    /// Of a frame whose part in some blocks, one at least, does not fit the counters.
+    pub(crate) fn of(operation: Operation, mut blocks: Vec<BlockKey>) -> Self {
+        blocks.sort_unstable();
+        match operation {
+            Operation::Integrate => Self::Full(blocks),
+            Operation::Deintegrate => Self::Error(Error::NotIntegrated { block: blocks[0].block() }),
+        }
+    }
+}
+
+/// Blocks that a frame passes over.
+#[derive(Default)]
+pub(crate) struct PassedOver {
+    /// Sorted.
+    blocks: Vec<BlockKey>,
+    /// Whether those join that have no room for it; otherwise it is refused.
+    grows: bool,
+}
+
+impl PassedOver {
+    /// What a frame was passed over in before, and is again.
+    pub(crate) fn new(blocks: &[[i32; 3]]) -> Self {
+        let mut blocks: Vec<BlockKey> = blocks.iter().copied().filter_map(BlockKey::new).collect();
+        blocks.sort_unstable();
+        Self { blocks, grows: false }
+    }
+
+    /// None yet; those join that have no room.
+    pub(crate) fn growing() -> Self {
+        Self { grows: true, ..Self::default() }
+    }
+
+    /// In place of what was there.
+    pub(crate) fn write(&self, blocks: &mut Vec<[i32; 3]>) {
+        blocks.clear();
+        blocks.extend(self.blocks.iter().map(|key| key.block()));
+    }
+
+    /// Tries to apply a frame to its blocks, passing over more of them from try to try.
+    pub(crate) fn apply<T>(
+        &mut self,
+        keys: &[BlockKey],
+        mut attempt: impl FnMut(&[BlockKey]) -> Result<T, Refusal>,
+    ) -> Result<T, Error> {
+        loop {
+            let rest: Vec<BlockKey>;
+            let wanted = if self.blocks.is_empty() {
+                keys
+            } else {
+                rest = keys.iter().copied().filter(|key| self.blocks.binary_search(key).is_err()).collect();
+                &rest
+            };
+            match attempt(wanted) {
+                Ok(done) => return Ok(done),
+                Err(Refusal::Full(more)) if self.grows => {
+                    self.blocks.extend(more);
+                    self.blocks.sort_unstable();
+                }
+                Err(Refusal::Full(blocks)) => return Err(Error::Saturated { block: blocks[0].block() }),
+                Err(Refusal::Error(error)) => return Err(error),
+            }
+        }
+    }
+}
+
 /// Applies a frame to those of the blocks near it that have these keys, in a [call](BlockStorage::begin_call). After an error the sums
 /// are as they were.
-pub(crate) fn apply_frame(storage: &mut BlockStorage, job: FrameJob, keys: &[BlockKey]) -> Result<FrameChange, Error> {
+pub(crate) fn apply_frame(
+    storage: &mut BlockStorage,
+    job: FrameJob,
+    keys: &[BlockKey],
+) -> Result<FrameChange, Refusal> {
     let mut update = FrameUpdate { storage, job, change: FrameChange::default() };
     update.run(keys)?;
     Ok(update.change)
 }
 
 impl FrameUpdate<'_> {
-    fn run(&mut self, keys: &[BlockKey]) -> Result<(), Error> {
+    fn run(&mut self, keys: &[BlockKey]) -> Result<(), Refusal> {
         if self.job.operation == Operation::Deintegrate {
             // What is taken out must have been in: that can be seen on whole sums only.
             self.consolidate(keys)?;
@@ -78,12 +161,10 @@ impl FrameUpdate<'_> {
             }
         }
         self.job.update(self.job.operation, &mut present);
-        let overflow = present.iter().find(|work| work.count.overflow).map(|work| work.key);
+        let overflow = present.iter().filter(|work| work.count.overflow).map(|work| work.key).collect();
         self.put_back(present);
-        let outcome = match overflow {
-            Some(key) => Err(refused(self.job.operation, key)),
-            None => self.check_split_blocks().and_then(|()| self.update_inactive(inactive)),
-        };
+        let outcome =
+            self.none(overflow).and_then(|()| self.check_split_blocks()).and_then(|()| self.update_inactive(inactive));
         match outcome {
             Ok(partials) => {
                 self.finish(partials);
@@ -96,6 +177,11 @@ impl FrameUpdate<'_> {
                 Err(error)
             }
         }
+    }
+
+    /// Refuses a frame that has no room in some blocks.
+    fn none(&self, unfit: Vec<BlockKey>) -> Result<(), Refusal> {
+        if unfit.is_empty() { Ok(()) } else { Err(Refusal::of(self.job.operation, unfit)) }
     }
 
     fn put_back(&mut self, present: Vec<CheckedOut>) {
@@ -124,16 +210,15 @@ impl FrameUpdate<'_> {
     }
 
     /// An active copy may have room left where the sum with the others has none.
-    fn check_split_blocks(&self) -> Result<(), Error> {
+    fn check_split_blocks(&self) -> Result<(), Refusal> {
+        let mut unfit = Vec::new();
         if self.job.operation == Operation::Integrate && !self.storage.all_active() {
             for &key in &self.change.touched {
                 let fits = self.storage.active.get(key).map_or(Ok(true), |block| self.storage.fits(key, block))?;
-                if !fits {
-                    return Err(refused(self.job.operation, key));
-                }
+                unfit.extend((!fits).then_some(key));
             }
         }
-        Ok(())
+        self.none(unfit)
     }
 
     /// Brings together all copies of the blocks that have one in active memory, and merges the reloaded ones.
@@ -157,7 +242,7 @@ impl FrameUpdate<'_> {
     /// The frame in blocks that are not active. As long as active memory has room, once what the frame does not touch is
     /// evicted, it gets copies of what is new in them: those are returned. For the rest, uncompressed blocks in host memory
     /// are changed where they are, and what is new elsewhere is staged among the evicted ones.
-    fn update_inactive(&mut self, mut inactive: Vec<BlockKey>) -> Result<Vec<PartialBlock>, Error> {
+    fn update_inactive(&mut self, mut inactive: Vec<BlockKey>) -> Result<Vec<PartialBlock>, Refusal> {
         let mut kept = Vec::new();
         while self.job.operation == Operation::Integrate
             && !inactive.is_empty()
@@ -196,8 +281,15 @@ impl FrameUpdate<'_> {
     }
 
     /// Adds the parts of a frame in blocks that are neither active nor uncompressed, or takes them out.
-    fn add_partials(&mut self, keys: &mut [BlockKey], kept: &mut Vec<PartialBlock>) -> Result<(), Error> {
+    fn add_partials(&mut self, keys: &mut [BlockKey], kept: &mut Vec<PartialBlock>) -> Result<(), Refusal> {
         let partials = partials(self.job.frame, keys, self.threads_for_partials());
+        if self.job.operation == Operation::Integrate {
+            let mut unfit = Vec::new();
+            for partial in &partials {
+                unfit.extend((!self.storage.fits(partial.key, &partial.block)?).then_some(partial.key));
+            }
+            self.none(unfit)?;
+        }
         let mut waiting = partials.len();
         let mut room = self.storage.active.room().saturating_sub(kept.len());
         let mut evictable = self.storage.evictable();
@@ -207,9 +299,6 @@ impl FrameUpdate<'_> {
             if self.job.operation == Operation::Deintegrate {
                 self.change.removed += usize::from(self.deintegrate_evicted(&partial)?);
                 continue;
-            }
-            if !self.storage.fits(partial.key, &partial.block)? {
-                return Err(refused(self.job.operation, partial.key));
             }
             self.change.added += usize::from(self.is_new(partial.key));
             if room == 0 && evictable > 0 {
@@ -231,19 +320,14 @@ impl FrameUpdate<'_> {
     }
 
     /// Changes uncompressed blocks in host memory. After an error they are as they were.
-    fn update_in_host(&mut self, keys: &[BlockKey]) -> Result<(), Error> {
+    fn update_in_host(&mut self, keys: &[BlockKey]) -> Result<(), Refusal> {
         let taken = keys.iter().filter_map(|&key| {
             let block = self.storage.evicted.check_out(key)?;
             Some(CheckedOut { key, slot: 0, block, count: UpdateCount::default() })
         });
         let mut present: Vec<_> = taken.collect();
         self.job.update(self.job.operation, &mut present);
-        let outcome = present.iter().try_for_each(|work| {
-            // Checked out it does not count twice: what it has to fit together with is reloaded.
-            let alone = self.job.operation == Operation::Deintegrate || self.storage.reloaded.len() == 0;
-            let fits = !work.count.overflow && (alone || self.storage.fits(work.key, &work.block)?);
-            if fits { Ok(()) } else { Err(refused(self.job.operation, work.key)) }
-        });
+        let outcome = self.unfit(&present).map_err(Refusal::Error).and_then(|unfit| self.none(unfit));
         if outcome.is_err() {
             self.job.update(self.job.operation.opposite(), &mut present);
         }
@@ -257,16 +341,28 @@ impl FrameUpdate<'_> {
         outcome
     }
 
+    /// Those of the blocks that cannot take what the frame has added to them, or have not got what it has taken out.
+    fn unfit(&self, present: &[CheckedOut]) -> Result<Vec<BlockKey>, Error> {
+        // Checked out it does not count twice: what it has to fit together with is reloaded.
+        let alone = self.job.operation == Operation::Deintegrate || self.storage.reloaded.len() == 0;
+        let mut unfit = Vec::new();
+        for work in present {
+            let fits = !work.count.overflow && (alone || self.storage.fits(work.key, &work.block)?);
+            unfit.extend((!fits).then_some(work.key));
+        }
+        Ok(unfit)
+    }
+
     fn is_new(&self, key: BlockKey) -> bool {
         !self.storage.evicted.contains(key) && self.storage.reloaded.get(key).is_none()
     }
 
     /// Takes a partial sum out of an evicted block; returns whether nothing is left of it.
-    fn deintegrate_evicted(&mut self, partial: &PartialBlock) -> Result<bool, Error> {
+    fn deintegrate_evicted(&mut self, partial: &PartialBlock) -> Result<bool, Refusal> {
         let mut sum = Box::new(VoxelBlock::ZERO);
         let history = self.storage.evicted.add_to(partial.key, &mut sum)?;
         let Some(mut history) = history.filter(|_| !sum.subtract(&partial.block)) else {
-            return Err(refused(Operation::Deintegrate, partial.key));
+            return Err(Refusal::of(Operation::Deintegrate, vec![partial.key]));
         };
         history.deintegrated();
         history.stamp = self.storage.active.clock.tick();
@@ -325,14 +421,6 @@ impl FrameJob<'_> {
             Operation::Integrate => history.integrated(self.time),
             Operation::Deintegrate => history.deintegrated(),
         }
-    }
-}
-
-/// Why a frame is refused whose part in a block does not fit the counters.
-pub(crate) fn refused(operation: Operation, key: BlockKey) -> Error {
-    match operation {
-        Operation::Integrate => Error::Saturated { block: key.block() },
-        Operation::Deintegrate => Error::NotIntegrated { block: key.block() },
     }
 }
 

@@ -336,7 +336,7 @@ impl Reserve {
             let outcome = tracker.track(&mut self.map, depth, colour, &prior)?;
             if tracker.is_sure(&outcome) {
                 let pose = outcome.world_from_camera;
-                self.map.integrate(depth, colour, &pose)?;
+                self.map.integrate_where_room(depth, colour, &pose, &mut Vec::new())?;
                 self.poses.push(pose);
                 if self.views.len() < VIEWS && !self.views.iter().any(|other| within(other, &pose, ANOTHER)) {
                     self.cloud.add(depth, &pose, self.map.settings().max_depth)?;

@@ -1,6 +1,7 @@
 //! Every input that is refused, and that the map does not notice.
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use tsdf_hash::layer::{TsdfLayer, VoxelBlock};
 use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Error, Map, NoiseModel, Settings};
 
 use crate::scene::{Shot, look_at};
@@ -132,6 +133,54 @@ fn a_full_voxel_is_an_error_and_not_a_wrong_average() {
     assert!(map.mesh().colours.iter().all(|c| *c == [255; 3]));
     // Depth alone still fits.
     map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
+}
+
+/// Sums of the voxels of a block; nothing where there is none.
+fn sums(map: &Map, block: [i32; 3]) -> Vec<[i64; 3]> {
+    let (reader, mut scratch) = (map.read_blocks(&mut std::iter::once(block)).unwrap(), VoxelBlock::ZERO);
+    let block = reader.block(block, &mut scratch).unwrap().unwrap_or(&VoxelBlock::ZERO).clone();
+    let of = |(distance, weight, colour): (i32, u16, [u16; 4])| [distance.into(), weight.into(), colour[3].into()];
+    (0..512).map(|voxel| of(block.sums(voxel).unwrap())).collect()
+}
+
+/// A camera that looks at one place for long, and then beside it: what is full takes nothing, all else does, and frames are taken out again
+/// from where they went.
+#[test]
+fn a_full_block_does_not_keep_a_frame_from_others() {
+    let shot = wall();
+    let rgb8 = vec![255; 3 * 3072];
+    let colour = ColourView { width: 64, height: 48, data: ColourData::Rgb8(&rgb8), intrinsics: shot.intrinsics };
+    let beside = Isometry3::translation(0.0, 0.5, 0.0) * shot.world_from_camera;
+    for threads in [1, 3] {
+        let settings = Settings { voxel_size: 0.04, threads, ..Settings::default() };
+        let (mut map, mut full) = (Map::new(settings).unwrap(), vec![[7; 3]]);
+        for _ in 0..1040 {
+            map.integrate_where_room(&shot.view(), Some(&colour), &shot.world_from_camera, &mut full).unwrap();
+            assert!(full.is_empty());
+        }
+        let before = map.hash();
+        let mut all = Vec::new();
+        let report = map.integrate_where_room(&shot.view(), Some(&colour), &shot.world_from_camera, &mut all).unwrap();
+        assert!(!all.is_empty() && map.mesh().colours.iter().all(|c| *c == [255; 3]), "{report:?}");
+        map.deintegrate_except(&shot.view(), Some(&colour), &shot.world_from_camera, &all).unwrap();
+        assert_eq!(map.hash(), before);
+
+        let mut alone = Map::new(settings).unwrap();
+        let wanted = alone.integrate(&shot.view(), Some(&colour), &beside).unwrap();
+        let blocks = alone.changes_since(None).changed;
+        let old: Vec<_> = blocks.iter().map(|block| sums(&map, *block)).collect();
+        let report = map.integrate_where_room(&shot.view(), Some(&colour), &beside, &mut full).unwrap();
+        assert!(!full.is_empty() && report.blocks_added > 0, "{report:?}");
+        assert_eq!(report.blocks + full.len(), wanted.blocks);
+        for (block, old) in blocks.iter().zip(old) {
+            let (new, seen, room) = (sums(&map, *block), sums(&alone, *block), i64::from(!full.contains(block)));
+            for (voxel, new) in new.iter().enumerate() {
+                assert_eq!(*new, std::array::from_fn(|k| old[voxel][k] + room * seen[voxel][k]), "{block:?}");
+            }
+        }
+        map.deintegrate_except(&shot.view(), Some(&colour), &beside, &full).unwrap();
+        assert_eq!(map.hash(), before);
+    }
 }
 
 #[test]

@@ -249,6 +249,20 @@ fn refused_frames_leave_no_trace() {
         (gpu.integrate(&view, Some(&colour), &pose), map.integrate(&view, Some(&colour), &pose).unwrap_err());
     let (Err(Error::Saturated { block }), Error::Saturated { block: first }) = (ours, expected) else { panic!() };
     assert_eq!((block, gpu.hash().unwrap()), (first, full));
+    // Where there is room they take the frame, and give it back.
+    let beside = Isometry3::translation(0.0, 0.5, 0.0) * pose;
+    let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+    let reports = [
+        gpu.integrate_where_room(&view, Some(&colour), &beside, &mut ours).unwrap(),
+        map.integrate_where_room(&view, Some(&colour), &beside, &mut theirs).unwrap(),
+    ];
+    assert!(reports[0].blocks_added > 0 && !ours.is_empty(), "{reports:?}");
+    assert_eq!((reports[0].voxels, &ours, gpu.hash().unwrap()), (reports[1].voxels, &theirs, map.hash()));
+    let reports = [
+        gpu.deintegrate_except(&view, Some(&colour), &beside, &ours).unwrap(),
+        map.deintegrate_except(&view, Some(&colour), &beside, &theirs).unwrap(),
+    ];
+    assert_eq!((gpu.hash().unwrap(), map.hash()), (full, full), "{reports:?}");
     // A wall so near that every observation weighs 15: 4369 of them fill a voxel.
     let near = Shot::take((24, 18), [20.0; 2], Isometry3::identity(), |_, d| Some(0.4 / d.z));
     let mut heavy = Map::new(settings).unwrap();
